@@ -1,0 +1,122 @@
+"""Beam profiles: how radiant intensity falls from the axis to the edge of a spotlight's cone.
+
+A profile g is relative, 1 on the axis and 0 outside the cone. `flux_factor` is its integral over solid angle
+[sr], so a radiant flux Phi makes the on-axis intensity Phi / flux_factor [W/sr].
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Annotated, Literal
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from pydantic import Field, model_validator
+
+from scene.model import Model
+from scene.quantity import Angle
+
+Array = NDArray[np.float64]
+_HalfAngle = Annotated[Angle, Field(gt=0.0, lt=math.pi / 2.0)]
+
+
+class HardBeam(Model):
+    """Uniform radiant intensity up to the half angle."""
+
+    kind: Literal["hard"] = "hard"
+    half_angle: _HalfAngle = math.radians(9.0)
+
+    def intensity(self, cos_angle: ArrayLike) -> Array:
+        """Relative radiant intensity at cosines of the angle off the axis, any shape."""
+        return np.where(np.asarray(cos_angle, float) >= math.cos(self.half_angle), 1.0, 0.0)
+
+    @property
+    def flux_factor(self) -> float:
+        """2 pi (1 - cos b) [sr]."""
+        return 2.0 * math.pi * (1.0 - math.cos(self.half_angle))
+
+
+class CyclesBeam(Model):
+    """Blender Cycles' spotlight: smoothstep((cos t - cos b) / (blend (1 - cos b))); blend 1 is fully soft."""
+
+    kind: Literal["cycles"] = "cycles"
+    half_angle: _HalfAngle = math.radians(9.0)
+    blend: float = Field(1.0, gt=0.0, le=1.0)
+
+    def intensity(self, cos_angle: ArrayLike) -> Array:
+        """Relative radiant intensity at cosines of the angle off the axis, any shape."""
+        cos_b = math.cos(self.half_angle)
+        u = np.clip((np.asarray(cos_angle, float) - cos_b) / (self.blend * (1.0 - cos_b)), 0.0, 1.0)
+        return u * u * (3.0 - 2.0 * u)
+
+    @property
+    def flux_factor(self) -> float:
+        """2 pi (1 - cos b) (1 - blend / 2) [sr]: the smoothstep's mean over its ramp is one half."""
+        return 2.0 * math.pi * (1.0 - math.cos(self.half_angle)) * (1.0 - self.blend / 2.0)
+
+
+class LinearBeam(Model):
+    """Mitsuba's `spot`: full intensity up to `beam_width`, then linear in the angle down to 0 at the half angle."""
+
+    kind: Literal["linear"] = "linear"
+    half_angle: _HalfAngle = math.radians(9.0)
+    beam_width: Annotated[Angle, Field(ge=0.0)] = math.radians(6.75)
+
+    @model_validator(mode="after")
+    def _narrower(self) -> LinearBeam:
+        if self.beam_width >= self.half_angle:
+            raise ValueError("beam_width must be smaller than half_angle")
+        return self
+
+    def intensity(self, cos_angle: ArrayLike) -> Array:
+        """Relative radiant intensity at cosines of the angle off the axis, any shape."""
+        angle = np.arccos(np.clip(np.asarray(cos_angle, float), -1.0, 1.0))
+        return np.clip((self.half_angle - angle) / (self.half_angle - self.beam_width), 0.0, 1.0)
+
+    @property
+    def flux_factor(self) -> float:
+        """2 pi [1 - cos w + integral over the ramp] = 2 pi [1 - (sin b - sin w) / (b - w)] [sr]."""
+        b, w = self.half_angle, self.beam_width
+        return 2.0 * math.pi * (1.0 - (math.sin(b) - math.sin(w)) / (b - w))
+
+
+class TabulatedBeam(Model):
+    """Measured profile: relative `intensities` at `angles`, linear in the angle between them, 0 beyond the last."""
+
+    kind: Literal["table"] = "table"
+    angles: tuple[Angle, ...] = Field(min_length=2, max_length=4096)
+    intensities: tuple[Annotated[float, Field(ge=0.0, le=1.0)], ...] = Field(min_length=2, max_length=4096)
+
+    @model_validator(mode="after")
+    def _a_profile(self) -> TabulatedBeam:
+        if len(self.angles) != len(self.intensities):
+            raise ValueError("angles and intensities must have the same length")
+        if self.angles[0] != 0.0 or self.intensities[0] != 1.0:
+            raise ValueError("the table must begin on the axis: angle 0 with intensity 1")
+        if np.any(np.diff(self.angles) <= 0.0):
+            raise ValueError("angles must increase")
+        if not self.angles[-1] < math.pi / 2.0:
+            raise ValueError("the last angle must be below 90 deg")
+        return self
+
+    @property
+    def half_angle(self) -> float:
+        """The last tabulated angle [rad]."""
+        return float(self.angles[-1])
+
+    def intensity(self, cos_angle: ArrayLike) -> Array:
+        """Relative radiant intensity at cosines of the angle off the axis, any shape."""
+        angle = np.arccos(np.clip(np.asarray(cos_angle, float), -1.0, 1.0))
+        return np.interp(angle, self.angles, self.intensities, right=0.0)
+
+    @property
+    def flux_factor(self) -> float:
+        """2 pi sum of the exact integrals of (linear in t) sin t over the table's intervals [sr]."""
+        t, g = np.asarray(self.angles), np.asarray(self.intensities)
+        slope = np.diff(g) / np.diff(t)
+        # integral of (a + s t) sin t = -(a + s t) cos t + s sin t
+        ends = [-g[i] * np.cos(t[i]) + slope * np.sin(t[i]) for i in (slice(None, -1), slice(1, None))]
+        return float(2.0 * math.pi * np.sum(ends[1] - ends[0]))
+
+
+Beam = Annotated[HardBeam | CyclesBeam | LinearBeam | TabulatedBeam, Field(discriminator="kind")]

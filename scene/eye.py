@@ -1,0 +1,40 @@
+"""The eye: a sphere that touches the origin with its posterior pole."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from pydantic import Field
+
+from scene.model import Model
+from scene.quantity import Length
+
+
+class Eye(Model):
+    """Sphere of radius r [mm]; centre (0, 0, r), posterior pole at the origin (paper, section 3.1)."""
+
+    radius: Length = Field(12.0, gt=0.0, le=100.0)
+
+    @property
+    def centre(self) -> NDArray[np.float64]:
+        """Centre of the eye `[3]` [mm]."""
+        return np.array([0.0, 0.0, self.radius])
+
+    def intersect(self, origin: ArrayLike, direction: ArrayLike) -> NDArray[np.float64]:
+        """Distance to the far wall along rays `[..., 3]` -> `[...]` [mm]; NaN where a ray misses.
+
+        The larger root of |o + t d - c|^2 = r^2: for a ray from inside the eye the wall in front of it, for one
+        from the camera the retina at the bottom.
+        """
+        o = np.asarray(origin, float) - self.centre
+        d = np.asarray(direction, float)
+        d2 = np.sum(d * d, axis=-1)
+        b = np.sum(o * d, axis=-1) / d2
+        disc = b * b - (np.sum(o * o, axis=-1) - self.radius**2) / d2
+        return -b + np.sqrt(np.where(disc >= 0.0, disc, np.nan))
+
+    def height(self, x: ArrayLike, y: ArrayLike) -> NDArray[np.float64]:
+        """z [mm] of the lower wall above (x, y) [mm]; NaN outside the eye's shadow."""
+        rho2 = np.square(np.asarray(x, float)) + np.square(np.asarray(y, float))
+        inside = np.where(rho2 <= self.radius**2, self.radius**2 - rho2, np.nan)
+        return self.radius - np.sqrt(inside)

@@ -1,0 +1,49 @@
+"""The base of every description: frozen, complete, and helpful about a misspelt key."""
+
+from __future__ import annotations
+
+import difflib
+import hashlib
+import json
+from typing import Any
+
+from pydantic import BaseModel, ConfigDict, model_validator
+from pydantic_core import PydanticCustomError
+
+
+class Model(BaseModel):
+    """A frozen description. An unknown key is refused with the nearest known one."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid", arbitrary_types_allowed=True)
+
+    @model_validator(mode="before")
+    @classmethod
+    def _known_keys(cls, data: Any) -> Any:
+        if isinstance(data, dict):
+            for key in data:
+                if key not in cls.model_fields:
+                    raise unknown_key(str(key), list(cls.model_fields))
+        return data
+
+
+def unknown_key(key: str, known: list[str]) -> PydanticCustomError:
+    """The error for a key that nothing reads; `key` in its context tells where it stands."""
+    near = difflib.get_close_matches(key, known, n=1)
+    hint = f"did you mean '{near[0]}'?" if near else f"known keys: {', '.join(known)}"
+    return PydanticCustomError("unknown_key", "unknown key '{key}'; {hint}", {"key": key, "hint": hint})
+
+
+def unknown_name(name: str, known: list[str], what: str) -> PydanticCustomError:
+    """The error for a name (of a trajectory, a sensor, ...) that does not exist."""
+    near = difflib.get_close_matches(name, known, n=1)
+    hint = f"did you mean '{near[0]}'?" if near else f"known: {', '.join(known)}"
+    return PydanticCustomError(
+        "unknown_name", "unknown {what} '{name}'; {hint}", {"what": what, "name": name, "hint": hint}
+    )
+
+
+def identity(*parts: BaseModel | str | int | float | None) -> str:
+    """A content address [16 hex digits]: equal for equal descriptions, whatever file they came from."""
+    plain = [part.model_dump(mode="json") if isinstance(part, BaseModel) else part for part in parts]
+    text = json.dumps(plain, sort_keys=True, separators=(",", ":"))
+    return hashlib.sha256(text.encode()).hexdigest()[:16]

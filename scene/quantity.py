@@ -1,0 +1,93 @@
+"""Physical quantities as they are written ("9 deg", "0.25 W") and as they are held (radians, mm, W, nm).
+
+In a file a number must carry its unit; in Python a bare float is taken in the unit held inside. The held unit
+of every kind is the one listed first in `UNITS`.
+"""
+
+from __future__ import annotations
+
+import math
+import re
+from typing import Annotated, Any
+
+from pydantic import BeforeValidator, PlainSerializer, ValidationInfo
+from pydantic_core import PydanticCustomError
+
+#: context key that marks data read from a file, where a bare number is refused
+FROM_FILE = "from_file"
+
+UNITS: dict[str, dict[str, float]] = {
+    "length": {"mm": 1.0, "um": 1e-3, "cm": 10.0, "m": 1000.0},
+    "angle": {"rad": 1.0, "deg": math.pi / 180.0},
+    "power": {"W": 1.0, "mW": 1e-3, "uW": 1e-6},
+    "wavelength": {"nm": 1.0, "um": 1e3},
+    "radiance": {"W/m2/sr": 1.0, "mW/m2/sr": 1e-3},
+    "irradiance": {"W/m2": 1.0, "mW/m2": 1e-3, "mW/cm2": 10.0, "uW/cm2": 1e-2},
+    "pixels": {"px": 1.0},
+    "time": {"s": 1.0, "ms": 1e-3, "us": 1e-6},
+}
+#: the unit a quantity is written back with
+WRITTEN = {
+    "length": "mm",
+    "angle": "deg",
+    "power": "W",
+    "wavelength": "nm",
+    "radiance": "W/m2/sr",
+    "irradiance": "W/m2",
+    "pixels": "px",
+    "time": "s",
+}
+_QUANTITY = re.compile(r"\s*([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)\s*([A-Za-z/0-9]+)\s*", re.ASCII)
+
+
+def parse_quantity(value: object, kind: str, *, bare: bool = True) -> float:
+    """The value in the unit held inside for `kind`.
+
+    Raises ValueError, in a sentence that says how to write it, for a wrong or missing unit, a bare number where
+    `bare` is False, and anything that is not finite.
+    """
+    units = UNITS[kind]
+    example = f"'{1 if kind == 'power' else 9} {WRITTEN[kind]}'"
+    if isinstance(value, bool) or not isinstance(value, (int, float, str)):
+        raise ValueError(f"expected a {kind} such as {example}, got {value!r}")
+    if isinstance(value, str):
+        match = _QUANTITY.fullmatch(value)
+        if match is None or match[2] not in units:
+            raise ValueError(f"expected a {kind} such as {example} (units: {', '.join(units)}), got {value!r}")
+        number = float(match[1]) * units[match[2]]
+    elif bare:
+        number = float(value)
+    else:
+        raise ValueError(f"{value!r} has no unit; write a {kind} such as {example} (units: {', '.join(units)})")
+    if not math.isfinite(number):
+        raise ValueError(f"a {kind} must be finite, got {value!r}")
+    return number
+
+
+def format_quantity(value: float, kind: str) -> str:
+    """The quantity as a file holds it, such as "9 deg"."""
+    unit = WRITTEN[kind]
+    return f"{value / UNITS[kind][unit]:.12g} {unit}"
+
+
+def _quantity(kind: str) -> Any:
+    def parse(value: object, info: ValidationInfo) -> float:
+        from_file = bool(info.context and info.context.get(FROM_FILE))
+        try:
+            return parse_quantity(value, kind, bare=not from_file)
+        except ValueError as error:
+            raise PydanticCustomError("quantity", "{reason}", {"reason": str(error)}) from None
+
+    def write(value: float) -> str:
+        return format_quantity(value, kind)
+
+    return Annotated[float, BeforeValidator(parse), PlainSerializer(write, return_type=str, when_used="json")]
+
+
+Length = _quantity("length")  #: [mm]
+Angle = _quantity("angle")  #: [rad]
+Watts = _quantity("power")  #: [W]
+Wavelength = _quantity("wavelength")  #: [nm]
+Radiance = _quantity("radiance")  #: [W m-2 sr-1]
+Irradiance = _quantity("irradiance")  #: [W m-2]
+Seconds = _quantity("time")  #: [s]

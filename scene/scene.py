@@ -1,0 +1,110 @@
+"""The scene: everything about the experiment but the pose."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import model_validator
+
+from scene.beam import Beam, CyclesBeam
+from scene.camera import Camera
+from scene.document import Document, find_document, merge, read_document
+from scene.eye import Eye
+from scene.illumination import Ambient, FlatBand
+from scene.model import Model
+from scene.pose import Pose
+from scene.power import Power
+from scene.retina import PhotoRetina, Retina
+from scene.sensor import Sensor, Srgb8
+from scene.spotlights import RIGS, Instrument, Spotlights, spotlight_axes
+from scene.surface import AnySurface, Surface
+
+
+class Scene(Model):
+    """Eye, camera, instrument, light and sensor: what both the renderer and a localizer may know."""
+
+    eye: Eye = Eye()
+    camera: Camera = Camera()
+    instrument: Instrument = Instrument()
+    spotlights: Spotlights = RIGS["single"]
+    beam: Beam = CyclesBeam()
+    power: Power = Power()
+    illumination: FlatBand = FlatBand()
+    ambient: Ambient = Ambient()
+    surface: AnySurface = Surface()
+    retina: Retina = PhotoRetina()
+    sensor: Sensor = Srgb8()
+
+    @model_validator(mode="after")
+    def _fits(self) -> Scene:
+        if self.camera.height <= 2.0 * self.eye.radius:
+            raise ValueError("camera.height must put the camera above the eye (more than twice eye.radius)")
+        for bump in self.surface.bumps:
+            if np.hypot(bump.x, bump.y) >= self.eye.radius:
+                raise ValueError(f"the bump at ({bump.x:g}, {bump.y:g}) mm lies outside the eye")
+        return self
+
+    def pose(self, apex: NDArray[np.float64]) -> Pose:
+        """The pose of the tip at `apex` `[3]` [mm]. Raises ValueError if it is outside the eye or in its wall."""
+        if self.depth(apex) <= 0.0:
+            raise ValueError(
+                f"the tip at ({', '.join(f'{c:g}' for c in apex)}) mm is outside the eye (radius {self.eye.radius:g} mm)"
+            )
+        return Pose.through(apex, self.instrument.rcm)
+
+    def depth(self, apex: NDArray[np.float64]) -> float:
+        """How far inside the surface a point `[3]` lies [mm]; negative outside."""
+        offset = np.asarray(apex, float) - self.eye.centre
+        distance = float(np.linalg.norm(offset))
+        direction = offset / distance if distance > 0.0 else np.array([0.0, 0.0, -1.0])
+        return self.eye.radius - float(self.surface.displacement(self.eye, direction)) - distance
+
+    def outline(self, pose: Pose, spotlight: int, points: int = 256) -> NDArray[np.float64]:
+        """Where the edge of a spotlight's cone meets the surface `[points, 3]` [mm], counted round the axis."""
+        axis = spotlight_axes(pose, self.spotlights)[spotlight]
+        helper = np.eye(3)[np.argmin(np.abs(axis))]
+        u = np.cross(axis, helper)
+        u /= np.linalg.norm(u)
+        v = np.cross(axis, u)
+        phi = np.arange(points) * 2.0 * np.pi / points
+        b = self.beam.half_angle
+        rays = np.cos(b) * axis + np.sin(b) * (np.cos(phi)[:, None] * u + np.sin(phi)[:, None] * v)
+        return self.surface.intersect(self.eye, pose.apex, rays)
+
+
+def read_scene(document: Document, *, at: tuple[str | int, ...] = ()) -> Scene:
+    """The scene in a document: a mapping that may start from a `preset`. Raises InputError."""
+    return expand(document, at).validate(Scene, at=at)
+
+
+def expand(document: Document, at: tuple[str | int, ...]) -> Document:
+    """The document with the mapping or preset name at `at` laid on the preset it names. Raises InputError."""
+    data: Any = document.data
+    for key in at:
+        data = data[key]
+    if isinstance(data, str):
+        data = {"preset": data}
+    if not isinstance(data, dict) or "preset" not in data:
+        return document
+    preset = read_document(find_document(str(data["preset"]), "scene", "presets", "scene preset"))
+    full = merge(preset.data, {k: v for k, v in data.items() if k != "preset"})
+    for key in reversed(at):
+        full = {key: full}
+    lines = {**{(*at, *k): v for k, v in preset.lines.items() if k}, **document.lines}
+    return Document(document.source, merge_at(document.data, full, at), lines, document.folder)
+
+
+def merge_at(data: dict[str, Any], new: dict[str, Any], at: tuple[str | int, ...]) -> dict[str, Any]:
+    """`data` with the value at `at` replaced by the one in `new`."""
+    if not at:
+        return new
+    key = str(at[0])
+    return {**data, key: merge_at(data.get(key, {}), new[key], at[1:]) if at[1:] else new[key]}
+
+
+def load_scene(name: str | Path) -> Scene:
+    """A scene by preset name (`paper`, `paper-code`) or from a YAML file. Raises InputError."""
+    return read_scene(read_document(find_document(str(name), "scene", "presets", "scene preset")))

@@ -1,0 +1,51 @@
+"""The image sensor: how radiance becomes pixel values. The exposure itself is `render.exposure`."""
+
+from __future__ import annotations
+
+from typing import Annotated, Any, Literal
+
+from pydantic import BeforeValidator, Field
+
+from scene.model import Model, unknown_name
+from scene.quantity import Radiance
+
+_White = Annotated[Radiance, Field(gt=0.0)]
+
+
+class Srgb8(Model):
+    """Eight bits with the sRGB transfer; radiance `white` and above is 255 (Blender's display frame)."""
+
+    kind: Literal["srgb8"] = "srgb8"
+    white: _White = 1.0
+
+    @property
+    def full_scale(self) -> int:
+        """Largest pixel value."""
+        return 255
+
+
+class Linear(Model):
+    """Pixel values proportional to radiance; `white` and above is the largest of `bits` bits."""
+
+    kind: Literal["linear"] = "linear"
+    white: _White = 1.0
+    bits: int = Field(12, ge=1, le=16)
+
+    @property
+    def full_scale(self) -> int:
+        """Largest pixel value."""
+        return int(2**self.bits - 1)
+
+
+SENSORS: dict[str, Srgb8 | Linear] = {"srgb8": Srgb8(), "linear": Linear()}
+
+
+def _named_sensor(value: Any) -> Any:
+    if isinstance(value, str):
+        if value not in SENSORS:
+            raise unknown_name(value, list(SENSORS), "sensor")
+        return SENSORS[value]
+    return value
+
+
+Sensor = Annotated[Annotated[Srgb8 | Linear, Field(discriminator="kind")], BeforeValidator(_named_sensor)]

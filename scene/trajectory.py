@@ -1,0 +1,181 @@
+"""Trajectories: where the tip goes. Every one gives `[N, 3]` tip positions [mm] for N poses."""
+
+from __future__ import annotations
+
+import csv
+import math
+from pathlib import Path
+from typing import Annotated, Any, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import BeforeValidator, Field, ValidationInfo
+
+from scene.model import Model, unknown_name
+from scene.quantity import Angle, Length, parse_quantity
+
+Array = NDArray[np.float64]
+Point = tuple[Length, Length, Length]
+
+
+class Box(Model):
+    """A closed loop through `corners`, in equal steps a side, each side with its first corner (paper, 4.1)."""
+
+    kind: Literal["box"] = "box"
+    corners: tuple[Point, ...] = Field(
+        ((-2.5, -2.5, 3.0), (2.5, -2.5, 4.0), (2.5, 2.5, 5.0), (-2.5, 2.5, 6.0)), min_length=2, max_length=1000
+    )
+
+    def positions(self, poses: int, rng: np.random.Generator) -> Array:
+        """Tip positions `[poses, 3]` [mm]."""
+        sides = len(self.corners)
+        loop = np.array([*self.corners, self.corners[0]])
+        u = np.arange(poses) * sides / poses
+        return np.stack([np.interp(u, np.arange(sides + 1), loop[:, k]) for k in range(3)], axis=-1)
+
+
+class Helix(Model):
+    """x = R sin(phi), y = R cos(phi), z = z0 + pitch phi, phi over `turns` turns, both ends included (4.1)."""
+
+    kind: Literal["helix"] = "helix"
+    radius: Length = Field(2.0, gt=0.0)
+    start_height: Length = Field(2.0, gt=0.0)
+    pitch: Length = 0.25  #: climb per radian [mm]
+    turns: float = Field(3.5, gt=0.0, le=1000.0)
+
+    def positions(self, poses: int, rng: np.random.Generator) -> Array:
+        """Tip positions `[poses, 3]` [mm]."""
+        phi = np.linspace(0.0, 2.0 * math.pi * self.turns, poses)
+        z = self.start_height + self.pitch * phi
+        return np.stack([self.radius * np.sin(phi), self.radius * np.cos(phi), z], axis=-1)
+
+
+class Spiral(Model):
+    """A flat Archimedean spiral outwards at one height."""
+
+    kind: Literal["spiral"] = "spiral"
+    radius: Length = Field(3.0, gt=0.0)
+    height: Length = Field(5.0, gt=0.0)
+    turns: float = Field(3.0, gt=0.0, le=1000.0)
+
+    def positions(self, poses: int, rng: np.random.Generator) -> Array:
+        """Tip positions `[poses, 3]` [mm]."""
+        u = np.linspace(0.0, 1.0, poses)
+        phi = 2.0 * math.pi * self.turns * u
+        z = np.full(poses, self.height)
+        return np.stack([self.radius * u * np.cos(phi), self.radius * u * np.sin(phi), z], axis=-1)
+
+
+class Line(Model):
+    """Equal steps from `start` to `end`, both included."""
+
+    kind: Literal["line"] = "line"
+    start: Point = (-2.5, 0.0, 3.0)
+    end: Point = (2.5, 0.0, 6.0)
+
+    def positions(self, poses: int, rng: np.random.Generator) -> Array:
+        """Tip positions `[poses, 3]` [mm]."""
+        return np.linspace(self.start, self.end, poses)
+
+
+class Volume(Model):
+    """A box-shaped volume: the paper's volume of interest is 10 x 10 x 5 mm (sections 1 and 3.3)."""
+
+    size: tuple[Length, Length, Length] = (5.0, 5.0, 5.0)
+    bottom: Length = 2.0  #: height of the lower face above the pole [mm]
+
+    def at(self, unit: Array) -> Array:
+        """Points [mm] at coordinates `[..., 3]` in the unit cube; x and y are centred on the optical axis."""
+        size = np.asarray(self.size)
+        return np.asarray(unit * size + [-size[0] / 2.0, -size[1] / 2.0, self.bottom])
+
+
+class Grid(Volume):
+    """A regular grid of cell centres; of n^3 >= poses cells every (n^3 / poses)-th is taken."""
+
+    kind: Literal["grid"] = "grid"
+
+    def positions(self, poses: int, rng: np.random.Generator) -> Array:
+        """Tip positions `[poses, 3]` [mm]."""
+        n = math.ceil(round(poses ** (1.0 / 3.0), 9))
+        index = np.arange(poses) * n**3 // poses
+        cells = np.stack([index % n, index // n % n, index // n**2], axis=-1)
+        return self.at((cells + 0.5) / n)
+
+
+class Random(Volume):
+    """Uniformly random in the volume, from the campaign's seed."""
+
+    kind: Literal["random"] = "random"
+
+    def positions(self, poses: int, rng: np.random.Generator) -> Array:
+        """Tip positions `[poses, 3]` [mm]."""
+        return self.at(rng.random((poses, 3)))
+
+
+class Table(Model):
+    """Tip positions from the columns x_mm, y_mm, z_mm of a CSV file, in its order; the first N of them are used."""
+
+    kind: Literal["csv"] = "csv"
+    file: str
+    points: tuple[Point, ...] = Field((), max_length=100_000, validate_default=False)
+
+    def positions(self, poses: int, rng: np.random.Generator) -> Array:
+        """Tip positions `[poses, 3]` [mm]. Raises ValueError if the file has fewer rows."""
+        if poses > len(self.points):
+            raise ValueError(f"{self.file} has {len(self.points)} positions but {poses} poses are asked for")
+        return np.array(self.points[:poses])
+
+
+def _read_points(path: Path) -> list[Point]:
+    """The positions in a CSV file with the columns x_mm, y_mm, z_mm. Raises ValueError with file and line."""
+    try:
+        if path.stat().st_size > 20_000_000:
+            raise ValueError(f"{path}: larger than 20 MB, not a list of positions")
+        with path.open(newline="", encoding="utf-8") as stream:
+            reader = csv.DictReader(stream)
+            missing = {"x_mm", "y_mm", "z_mm"} - set(reader.fieldnames or ())
+            if missing:
+                raise ValueError(f"{path}:1: no column {', '.join(sorted(missing))}; a header x_mm,y_mm,z_mm is needed")
+            points: list[Point] = []
+            for row in reader:
+                try:
+                    x, y, z = (float(row[k]) for k in ("x_mm", "y_mm", "z_mm"))
+                    points.append((parse_quantity(x, "length"), parse_quantity(y, "length"), parse_quantity(z, "length")))
+                except (TypeError, ValueError):
+                    raise ValueError(f"{path}:{reader.line_num}: x_mm, y_mm, z_mm must be finite numbers") from None
+    except (OSError, UnicodeDecodeError, csv.Error) as error:
+        raise ValueError(f"{path}: cannot be read as CSV ({error})") from None
+    return points
+
+
+Trajectory = Annotated[
+    Box | Helix | Spiral | Line | Grid | Random | Table,
+    Field(discriminator="kind"),
+]
+KINDS: dict[str, type[Model]] = {
+    "box": Box,
+    "helix": Helix,
+    "spiral": Spiral,
+    "line": Line,
+    "grid": Grid,
+    "random": Random,
+    "csv": Table,
+}
+
+
+def _named_trajectory(value: Any, info: ValidationInfo) -> Any:
+    if isinstance(value, str):
+        value = {"kind": value}
+    if isinstance(value, dict):
+        kind = value.get("kind")
+        if kind not in KINDS:
+            raise unknown_name(str(kind), list(KINDS), "trajectory")
+        if kind == "csv" and isinstance(value.get("file"), str) and "points" not in value:
+            folder = Path((info.context or {}).get("folder", "."))
+            points = _read_points(folder / value["file"])
+            value = {**value, "points": [tuple(f"{c!r} mm" for c in p) for p in points]}
+    return value
+
+
+AnyTrajectory = Annotated[Trajectory, BeforeValidator(_named_trajectory)]
