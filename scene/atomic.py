@@ -1,0 +1,44 @@
+"""Files that are either whole or not there: nobody ever reads half a table."""
+
+from __future__ import annotations
+
+import os
+import secrets
+from pathlib import Path
+
+from scene.document import InputError
+
+
+def write_atomically(path: Path, data: bytes) -> None:
+    """Write `data` to `path`: to a temporary file beside it, onto the disk, then renamed over it.
+
+    The folder must exist. Whatever happens, `path` holds its old content or all of the new, and no temporary file
+    is left behind by an error. Raises InputError if the file cannot be written.
+    """
+    temporary = path.with_name(f".{path.name[:100]}.{secrets.token_hex(4)}.tmp")
+    try:
+        # not tempfile, whose files nobody else may read
+        handle = os.open(temporary, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o666)
+        try:
+            with open(handle, "wb") as stream:
+                stream.write(data)
+                stream.flush()
+                os.fsync(stream.fileno())
+            os.replace(temporary, path)
+        except BaseException:
+            temporary.unlink(missing_ok=True)
+            raise
+        _sync_folder(path.parent)
+    except OSError as error:
+        raise InputError(f"{path}: cannot be written: {error.strerror}; choose another --out") from None
+
+
+def _sync_folder(folder: Path) -> None:
+    """The rename itself reaches the disk only with its folder; not every system can open one."""
+    if not hasattr(os, "O_DIRECTORY"):
+        return
+    handle = os.open(folder, os.O_RDONLY | os.O_DIRECTORY)
+    try:
+        os.fsync(handle)
+    finally:
+        os.close(handle)
