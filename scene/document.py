@@ -17,7 +17,7 @@ from ruamel.yaml import YAML
 from ruamel.yaml.error import MarkedYAMLError, YAMLError
 from ruamel.yaml.nodes import MappingNode, Node, ScalarNode, SequenceNode
 
-from scene.quantity import FROM_FILE
+from scene.quantity import FROM_FILE, in_unit_of
 
 T = TypeVar("T")
 Path_ = tuple[str | int, ...]
@@ -77,7 +77,12 @@ class Document:
         if first["type"] == "missing":
             said = "is required but missing"
         elif first["type"] not in {"unknown_key", "unknown_name", "quantity", "value_error"}:
-            said = f"{said[0].lower()}{said[1:]}, got {_short(first['input'])}"
+            said = f"{said[0].lower()}{said[1:]}"
+            written, bound = here, next(iter(first.get("ctx", {}).values()), None)
+            if isinstance(written, str) and isinstance(bound, float):
+                # a bound reads best in the unit the value was written in
+                said = f"{said.removesuffix(str(bound).removesuffix('.0'))}{in_unit_of(written, bound)}"
+            said += f", got {_short(written if isinstance(written, (str, int, float)) else first['input'])}"
         return f"{self.place(keys)}: {name + ': ' if name else ''}{said}"
 
 
@@ -97,25 +102,36 @@ def read_document(path: Path) -> Document:
         raise InputError(f"{path}: cannot be read: {error.strerror}") from None
     if len(raw) > _MAX_BYTES:
         raise InputError(f"{path}: larger than {_MAX_BYTES} bytes, which no description needs")
-    yaml = YAML(typ="safe", pure=True)
     try:
-        text = raw.decode("utf-8")
-        node = yaml.compose(text)
-        lines: dict[Path_, str] = {}
-        data = _plain(yaml, node, str(path), (), lines, set()) if node is not None else None
-    except MarkedYAMLError as error:
-        mark = error.problem_mark or error.context_mark
-        line = f":{mark.line + 1}" if mark else ""
-        raise InputError(f"{path}{line}: not valid YAML: {error.problem or error.context}") from None
-    except (YAMLError, UnicodeDecodeError) as error:
-        raise InputError(f"{path}: not valid YAML: {' '.join(str(error).split())}") from None
-    except RecursionError:
-        raise InputError(f"{path}: nested too deeply") from None
+        data, lines = _load(raw.decode("utf-8"), str(path))
+    except UnicodeDecodeError as error:
+        raise InputError(f"{path}: not valid YAML: {error}") from None
     if data is None:
         raise InputError(f"{path}: is empty; `campaign show power_sweep` prints an example")
     if not isinstance(data, dict):
         raise InputError(f"{path}:1: must hold `key: value` lines, not {type(data).__name__}")
     return Document(str(path), data, lines, path.parent)
+
+
+def read_value(text: str, source: str) -> Any:
+    """The plain value that a piece of YAML 1.2 holds; `source` names it in messages. Raises InputError."""
+    return _load(text, source)[0]
+
+
+def _load(text: str, source: str) -> tuple[Any, dict[Path_, str]]:
+    yaml = YAML(typ="safe", pure=True)
+    lines: dict[Path_, str] = {}
+    try:
+        node = yaml.compose(text)
+        return (_plain(yaml, node, source, (), lines, set()) if node is not None else None), lines
+    except MarkedYAMLError as error:
+        mark = error.problem_mark or error.context_mark
+        line = f":{mark.line + 1}" if mark else ""
+        raise InputError(f"{source}{line}: not valid YAML: {error.problem or error.context}") from None
+    except YAMLError as error:
+        raise InputError(f"{source}: not valid YAML: {' '.join(str(error).split())}") from None
+    except RecursionError:
+        raise InputError(f"{source}: nested too deeply") from None
 
 
 def _plain(yaml: YAML, node: Node, source: str, path: Path_, lines: dict[Path_, str], seen: set[int]) -> Any:
@@ -162,7 +178,9 @@ def merge(base: dict[str, Any], over: dict[str, Any]) -> dict[str, Any]:
     result = dict(base)
     for key, value in over.items():
         old = result.get(key)
-        same_kind = isinstance(old, dict) and isinstance(value, dict) and value.get("kind", old.get("kind")) == old.get("kind")
+        same_kind = (
+            isinstance(old, dict) and isinstance(value, dict) and value.get("kind", old.get("kind")) == old.get("kind")
+        )
         result[key] = merge(old, value) if same_kind and isinstance(old, dict) else value
     return result
 
@@ -186,8 +204,8 @@ def find_document(name: str, package: str, folder: str, what: str) -> Path:
     raise InputError(f"{name}: no such {what}, neither a file nor shipped; {hint}")
 
 
-def dump(model: BaseModel) -> str:
-    """The model as a YAML file that reads back to an equal model."""
+def dump(content: BaseModel | dict[str, Any]) -> str:
+    """A model, or plain data, as a YAML file that reads back to an equal one."""
     import io
 
     stream = io.StringIO()
@@ -195,5 +213,5 @@ def dump(model: BaseModel) -> str:
     yaml.default_flow_style = None
     yaml.width = 110
     yaml.sort_base_mapping_type_on_output = False
-    yaml.dump(model.model_dump(mode="json"), stream)
+    yaml.dump(content.model_dump(mode="json") if isinstance(content, BaseModel) else content, stream)
     return stream.getvalue()

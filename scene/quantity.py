@@ -70,6 +70,13 @@ def format_quantity(value: float, kind: str) -> str:
     return f"{value / UNITS[kind][unit]:.12g} {unit}"
 
 
+def in_unit_of(written: str, value: float) -> str:
+    """A held `value` in the unit of a quantity as `written`: pi / 2 beside "9 deg" is "90 deg"."""
+    match = _QUANTITY.fullmatch(written)
+    factors = {units[match[2]] for units in UNITS.values() if match[2] in units} if match else set()
+    return f"{value / factors.pop():.12g} {match[2]}" if match and len(factors) == 1 else f"{value:g}"
+
+
 def _quantity(kind: str) -> Any:
     def parse(value: object, info: ValidationInfo) -> float:
         from_file = bool(info.context and info.context.get(FROM_FILE))
