@@ -192,7 +192,7 @@ def shipped(package: str, folder: str) -> dict[str, Path]:
 
 
 def find_document(name: str, package: str, folder: str, what: str) -> Path:
-    """The file `name` names: a path if it looks like one or exists, else a shipped one. Raises InputError if neither."""
+    """The file `name` names: a path that exists, else a shipped one. Raises InputError if neither."""
     path = Path(name)
     if path.exists():
         return path

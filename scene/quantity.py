@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 import re
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 from pydantic import BeforeValidator, PlainSerializer, ValidationInfo
 from pydantic_core import PydanticCustomError
@@ -91,10 +91,19 @@ def _quantity(kind: str) -> Any:
     return Annotated[float, BeforeValidator(parse), PlainSerializer(write, return_type=str, when_used="json")]
 
 
-Length = _quantity("length")  #: [mm]
-Angle = _quantity("angle")  #: [rad]
-Watts = _quantity("power")  #: [W]
-Wavelength = _quantity("wavelength")  #: [nm]
-Radiance = _quantity("radiance")  #: [W m-2 sr-1]
-Irradiance = _quantity("irradiance")  #: [W m-2]
-Seconds = _quantity("time")  #: [s]
+if TYPE_CHECKING:
+    Length = float
+    Angle = float
+    Watts = float
+    Wavelength = float
+    Radiance = float
+    Irradiance = float
+    Seconds = float
+else:
+    Length = _quantity("length")  #: [mm]
+    Angle = _quantity("angle")  #: [rad]
+    Watts = _quantity("power")  #: [W]
+    Wavelength = _quantity("wavelength")  #: [nm]
+    Radiance = _quantity("radiance")  #: [W m-2 sr-1]
+    Irradiance = _quantity("irradiance")  #: [W m-2]
+    Seconds = _quantity("time")  #: [s]

@@ -13,7 +13,7 @@ from scene.beam import Beam, CyclesBeam
 from scene.camera import Camera
 from scene.document import Document, find_document, merge, read_document
 from scene.eye import Eye
-from scene.illumination import Ambient, FlatBand
+from scene.illumination import Ambient, FlatBand, Illumination
 from scene.model import Model
 from scene.pose import Pose
 from scene.power import Power
@@ -32,7 +32,7 @@ class Scene(Model):
     spotlights: Spotlights = RIGS["single"]
     beam: Beam = CyclesBeam()
     power: Power = Power()
-    illumination: FlatBand = FlatBand()
+    illumination: Illumination = FlatBand()
     ambient: Ambient = Ambient()
     surface: AnySurface = Surface()
     retina: Retina = PhotoRetina()
@@ -51,7 +51,8 @@ class Scene(Model):
         """The pose of the tip at `apex` `[3]` [mm]. Raises ValueError if it is outside the eye or in its wall."""
         if self.depth(apex) <= 0.0:
             raise ValueError(
-                f"the tip at ({', '.join(f'{c:g}' for c in apex)}) mm is outside the eye (radius {self.eye.radius:g} mm)"
+                f"the tip at ({', '.join(f'{c:g}' for c in apex)}) mm is outside the eye"
+                f" (radius {self.eye.radius:g} mm)"
             )
         return Pose.through(apex, self.instrument.rcm)
 
@@ -60,7 +61,7 @@ class Scene(Model):
         offset = np.asarray(apex, float) - self.eye.centre
         distance = float(np.linalg.norm(offset))
         direction = offset / distance if distance > 0.0 else np.array([0.0, 0.0, -1.0])
-        return self.eye.radius - float(self.surface.displacement(self.eye, direction)) - distance
+        return float(self.eye.radius) - float(self.surface.displacement(self.eye, direction)) - distance
 
     def outline(self, pose: Pose, spotlight: int, points: int = 256) -> NDArray[np.float64]:
         """Where the edge of a spotlight's cone meets the surface `[points, 3]` [mm], counted round the axis."""
@@ -92,7 +93,7 @@ def expand(document: Document, at: tuple[str | int, ...]) -> Document:
     preset = read_document(find_document(str(data["preset"]), "scene", "presets", "scene preset"))
     full = merge(preset.data, {k: v for k, v in data.items() if k != "preset"})
     for key in reversed(at):
-        full = {key: full}
+        full = {str(key): full}
     lines = {**{(*at, *k): v for k, v in preset.lines.items() if k}, **document.lines}
     return Document(document.source, merge_at(document.data, full, at), lines, document.folder)
 

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from pydantic import BeforeValidator, Field, ValidationInfo
 
 from scene.model import Model, unknown_name
-from scene.quantity import Angle, Length, parse_quantity
+from scene.quantity import Length, parse_quantity
 
 Array = NDArray[np.float64]
 Point = tuple[Length, Length, Length]
@@ -141,7 +141,9 @@ def _read_points(path: Path) -> list[Point]:
             for row in reader:
                 try:
                     x, y, z = (float(row[k]) for k in ("x_mm", "y_mm", "z_mm"))
-                    points.append((parse_quantity(x, "length"), parse_quantity(y, "length"), parse_quantity(z, "length")))
+                    points.append(
+                        (parse_quantity(x, "length"), parse_quantity(y, "length"), parse_quantity(z, "length"))
+                    )
                 except (TypeError, ValueError):
                     raise ValueError(f"{path}:{reader.line_num}: x_mm, y_mm, z_mm must be finite numbers") from None
     except (OSError, UnicodeDecodeError, csv.Error) as error:

@@ -1,0 +1,58 @@
+"""Exposure: radiance becomes the sensor's pixel values. Power enters here and nowhere else."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from render.tile import Crop, Tile
+from scene.sensor import Sensor, Srgb8
+
+
+def encode(radiance: NDArray[np.floating[Any]], sensor: Sensor) -> NDArray[np.uint8] | NDArray[np.uint16]:
+    """Pixel values of radiances [W m-2 sr-1], any shape: clipped at white, transferred, rounded to whole numbers.
+
+    `srgb8` follows IEC 61966-2-1; `linear` is proportional.
+    """
+    relative = np.clip(radiance / np.float32(sensor.white), 0.0, 1.0)
+    if isinstance(sensor, Srgb8):
+        low = 12.92 * relative
+        relative = np.where(relative <= 0.0031308, low, 1.055 * relative ** np.float32(1.0 / 2.4) - 0.055)
+    values = np.floor(relative * sensor.full_scale + 0.5)
+    return values.astype(np.uint8) if sensor.full_scale <= 255 else values.astype(np.uint16)
+
+
+class Exposure:
+    """Exposes frames over one background `[H, W, C]` [W m-2 sr-1]: only what the tiles touch is computed anew."""
+
+    def __init__(self, background: NDArray[np.float32], sensor: Sensor) -> None:
+        self._background = background
+        self._sensor = sensor
+        self._encoded = np.concatenate([encode(band, sensor) for band in np.array_split(background, 16)])
+
+    def frame(self, tiles: Sequence[Tile], power_w: float) -> NDArray[np.uint8] | NDArray[np.uint16]:
+        """The image `[H, W]`, or `[H, W, C]` of several channels, with every spotlight at `power_w` [W]."""
+        image = self._encoded.copy()
+        lit = [tile for tile in tiles if tile.radiance.size]
+        if lit:
+            crop, total = merged(lit)
+            radiance = self._background[crop.slices] + np.float32(power_w) * total
+            image[crop.slices] = encode(radiance, self._sensor)
+        return image[..., 0] if image.shape[-1] == 1 else image
+
+
+def merged(tiles: Sequence[Tile]) -> tuple[Crop, NDArray[np.float32]]:
+    """The tiles' sum `[h, w, C]` over the crop that holds them all."""
+    row = min(t.crop.row for t in tiles)
+    column = min(t.crop.column for t in tiles)
+    height = max(t.crop.row + t.crop.height for t in tiles) - row
+    width = max(t.crop.column + t.crop.width for t in tiles) - column
+    total = np.zeros((height, width, tiles[0].radiance.shape[-1]), np.float32)
+    for tile in tiles:
+        rows = slice(tile.crop.row - row, tile.crop.row - row + tile.crop.height)
+        columns = slice(tile.crop.column - column, tile.crop.column - column + tile.crop.width)
+        total[rows, columns] += tile.radiance
+    return Crop(row, column, height, width), total

@@ -1,0 +1,79 @@
+"""Frames on disk: radiance as multi-channel EXR with its provenance, previews as PNG."""
+
+from __future__ import annotations
+
+import secrets
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from scene import InputError, Pose, Scene
+from scene.atomic import write_atomically
+from scene.document import dump
+
+
+def frame_header(scene: Scene, pose: Pose, power_w: float, versions: Mapping[str, str]) -> dict[str, str | float]:
+    """What a frame's EXR header says: pose, power with its convention, wavelengths, versions and the whole scene."""
+    apex, axis = pose.apex, pose.axis
+    return {
+        "conespot.unit": "W m-2 sr-1",
+        "conespot.apex_mm": " ".join(f"{c:.9g}" for c in apex),
+        "conespot.axis": " ".join(f"{c:.9g}" for c in axis),
+        "conespot.power_w": float(power_w),
+        "conespot.power_convention": scene.power.convention,
+        "conespot.wavelengths_nm": f"{scene.illumination.spectrum.low:g} {scene.illumination.spectrum.high:g}",
+        "conespot.scene": dump(scene),
+        **{f"conespot.version.{name}": version for name, version in versions.items()},
+    }
+
+
+def write_frame(path: Path, radiance: NDArray[np.float32], header: Mapping[str, str | float]) -> None:
+    """Write radiance `[H, W, C]` as 32-bit EXR, one channel each: `Y` alone, else `C0`, `C1`, ...
+
+    The file is whole or not there. Raises InputError if it cannot be written.
+    """
+    import OpenEXR
+
+    names = ["Y"] if radiance.shape[-1] == 1 else [f"C{i}" for i in range(radiance.shape[-1])]
+    channels = {name: np.ascontiguousarray(radiance[..., i]) for i, name in enumerate(names)}
+    # OpenEXR writes to a path only, so the file is made beside its place and renamed
+    temporary = path.with_name(f".{secrets.token_hex(4)}.exr")
+    attributes: dict[str, Any] = {"compression": OpenEXR.ZIP_COMPRESSION, "type": OpenEXR.scanlineimage, **header}
+    try:
+        with OpenEXR.File(attributes, channels) as file:
+            file.write(str(temporary))
+        temporary.replace(path)
+    except (OSError, RuntimeError) as error:
+        temporary.unlink(missing_ok=True)
+        raise InputError(f"{path}: cannot be written: {error}") from None
+
+
+def read_frame(path: Path) -> tuple[NDArray[np.float32], dict[str, Any]]:
+    """Radiance `[H, W, C]` and the header of a frame. Raises InputError if the file is no such frame."""
+    import OpenEXR
+
+    try:
+        with OpenEXR.File(str(path), separate_channels=True) as file:
+            header, channels = dict(file.header()), file.channels()
+            names = ["Y"] if "Y" in channels else sorted((n for n in channels if n[0] == "C"), key=lambda n: int(n[1:]))
+            radiance = np.stack([channels[name].pixels for name in names], axis=-1).astype(np.float32)
+    except (OSError, RuntimeError, ValueError, KeyError) as error:
+        raise InputError(f"{path}: cannot be read as a conespot frame: {error}") from None
+    return radiance, header
+
+
+def write_preview(path: Path, image: NDArray[Any], full_scale: int) -> None:
+    """Write an image `[H, W]` or `[H, W, 3]` (RGB), whose white is `full_scale`, as an 8-bit PNG of at most 1000 px."""
+    shown: NDArray[Any] = image.astype(np.float32) * (255.0 / full_scale)
+    side = max(shown.shape[:2])
+    if side > 1000:
+        scale = 1000.0 / side
+        shown = cv2.resize(shown, None, fx=scale, fy=scale, interpolation=cv2.INTER_AREA)
+    ready, png = cv2.imencode(".png", np.rint(shown[..., ::-1] if shown.ndim == 3 else shown).astype(np.uint8))
+    if not ready:
+        raise InputError(f"{path}: the image cannot be encoded as PNG")
+    write_atomically(path, png.tobytes())

@@ -1,0 +1,83 @@
+"""What the retina reflects: the one class that a renderer asks for albedo.
+
+Maps lie in arc coordinates: `a = (a_x, a_y)` [mm] is the distance along the sphere from the posterior pole in the
+direction of (x, y), so that a photograph keeps its scale everywhere (azimuthal equidistant projection).
+"""
+
+from __future__ import annotations
+
+import functools
+from importlib import resources
+from typing import Any
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from scene.retina import PhotoRetina, Retina, UniformRetina
+
+#: side of a texel [mm]: the photograph shows 14 mm on 1411 px
+TEXEL = 0.01
+#: half the side of the map [mm]
+EXTENT = 12.0
+#: centre (x, y) and radius [px] of the photograph's round field
+_FIELD = (705.0, 705.0, 680.0)
+
+
+class Reflectance:
+    """Albedo of the retina over its arc coordinates."""
+
+    def __init__(self, retina: Retina) -> None:
+        self.retina = retina
+
+    @functools.cached_property
+    def map(self) -> NDArray[np.float32]:
+        """Albedo `[N, N]` of texels of `TEXEL` mm over +-`EXTENT` mm; rows run down (-y), columns right (+x)."""
+        if isinstance(self.retina, UniformRetina):
+            return np.full((2, 2), self.retina.albedo, np.float32)
+        return _photo_map(self.retina)
+
+    def texture(self, mi: Any) -> dict[str, Any]:
+        """The Mitsuba texture, over the texture coordinates that `texture_coordinates` gives."""
+        if isinstance(self.retina, UniformRetina):
+            return {"type": "uniform", "value": self.retina.albedo}
+        bitmap = mi.Bitmap(self.map[..., None])
+        return {"type": "bitmap", "bitmap": bitmap, "raw": True, "filter_type": "bilinear", "wrap_mode": "clamp"}
+
+    @staticmethod
+    def texture_coordinates(arc: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Mitsuba's (u, v) `[..., 2]` of arc coordinates `[..., 2]` [mm]: v = 0 is the map's first row, at +y."""
+        return np.stack([0.5 + arc[..., 0] / (2.0 * EXTENT), 0.5 - arc[..., 1] / (2.0 * EXTENT)], axis=-1)
+
+
+def _photo_map(retina: PhotoRetina) -> NDArray[np.float32]:
+    """The photograph's luminance without its uneven illumination, continued beyond its field by reflection."""
+    data = np.frombuffer(resources.files("render").joinpath("data/retina.jpg").read_bytes(), np.uint8)
+    photo = cv2.imdecode(data, cv2.IMREAD_COLOR)
+    if photo is None:
+        raise RuntimeError("render/data/retina.jpg cannot be decoded: the installation is damaged")
+    encoded = photo.astype(np.float64) / 255.0
+    linear = np.where(encoded <= 0.04045, encoded / 12.92, ((encoded + 0.055) / 1.055) ** 2.4)
+    luminance = linear @ [0.0722, 0.7152, 0.2126]  # IEC 61966-2-1, blue first as OpenCV decodes
+
+    centre_x, centre_y, radius = _FIELD
+    n = round(2.0 * EXTENT / TEXEL)
+    x, y = np.meshgrid((np.arange(n) + 0.5) - n / 2.0, (np.arange(n) + 0.5) - n / 2.0)
+    rho = np.maximum(np.hypot(x, y), 1e-9)
+    folded = radius - np.abs(np.mod(rho, 2.0 * radius) - radius)
+    source_x, source_y = centre_x + x * folded / rho, centre_y + y * folded / rho
+    filled = cv2.remap(
+        luminance.astype(np.float32),
+        source_x.astype(np.float32) - 0.5,
+        source_y.astype(np.float32) - 0.5,
+        cv2.INTER_LINEAR,
+        borderMode=cv2.BORDER_REPLICATE,
+    )
+    # 3 mm keeps vessels, fovea and disc and takes away the falling-off towards the photograph's rim
+    small = cv2.resize(filled, None, fx=0.1, fy=0.1, interpolation=cv2.INTER_AREA)
+    shade = cv2.GaussianBlur(small, (0, 0), 0.1 * 3.0 / TEXEL)
+    flat = filled / cv2.resize(shade, (n, n), interpolation=cv2.INTER_LINEAR)
+    central = slice(n // 2 - 500, n // 2 + 500)  # the paper's 10 x 10 mm area of interest
+    low, high = retina.contrast
+    relative = np.clip(flat / flat[central, central].mean(), low, high)
+    return (retina.mean * relative / relative[central, central].mean()).astype(np.float32)

@@ -1,0 +1,67 @@
+"""The retina as a triangle mesh with exact vertex normals."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from render.reflectance import Reflectance
+from scene import Scene
+
+#: edge of the mesh [mm]: the chord then departs from the sphere by 10 nm
+EDGE = 0.03
+
+
+def arc_extent(scene: Scene) -> float:
+    """Half the side [mm] of the square, in arc coordinates, that holds all the retina the camera can see."""
+    n = scene.camera.resolution
+    along = np.linspace(0.0, n, 33)
+    border = np.concatenate([[(t, 0.0), (t, n), (0.0, t), (n, t)] for t in along])
+    hits = scene.eye.intersect(scene.camera.centre, scene.camera.back_project(border))
+    limit = scene.eye.radius * math.pi / 2.0
+    if np.any(np.isnan(hits)):
+        return limit
+    points = scene.camera.centre + hits[:, None] * scene.camera.back_project(border)
+    return float(min(1.02 * np.max(np.abs(to_arc(scene, points))) + scene.surface.relief, limit))
+
+
+def to_arc(scene: Scene, points: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Arc coordinates `[..., 2]` [mm] of points `[..., 3]`: azimuthal equidistant about the posterior pole."""
+    offset = points - scene.eye.centre
+    rho = np.hypot(offset[..., 0], offset[..., 1])
+    arc = scene.eye.radius * np.arctan2(rho, -offset[..., 2])
+    return offset[..., :2] * (arc / np.where(rho > 0.0, rho, 1.0))[..., None]
+
+
+def from_arc(scene: Scene, arc: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Unit directions `[..., 3]` from the eye's centre at arc coordinates `[..., 2]` [mm]."""
+    angle = np.linalg.norm(arc, axis=-1) / scene.eye.radius
+    sideways = arc / scene.eye.radius * np.sinc(angle / np.pi)[..., None]
+    return np.concatenate([sideways, -np.cos(angle)[..., None]], axis=-1)
+
+
+def retina_mesh(mi: Any, scene: Scene, bsdf: Any) -> Any:
+    """The Mitsuba mesh of the visible retina: bumps displaced, normals from the surface's closed form."""
+    extent = arc_extent(scene)
+    n = math.ceil(2.0 * extent / EDGE) + 1
+    ticks = np.linspace(-extent, extent, n)
+    arc = np.stack(np.meshgrid(ticks, ticks, indexing="xy"), axis=-1).reshape(-1, 2)
+    directions = from_arc(scene, arc)
+    corner = (np.arange(n - 1)[:, None] * n + np.arange(n - 1)).ravel()
+    faces = np.concatenate(
+        [np.stack([corner, corner + 1, corner + n], 1), np.stack([corner + 1, corner + n + 1, corner + n], 1)]
+    )
+
+    properties = mi.Properties()
+    properties["bsdf"] = bsdf
+    mesh = mi.Mesh("retina", len(arc), len(faces), has_vertex_normals=True, has_vertex_texcoords=True, props=properties)
+    parameters = mi.traverse(mesh)
+    parameters["faces"] = faces.astype(np.uint32).ravel()
+    parameters["vertex_positions"] = scene.surface.points(scene.eye, directions).astype(np.float32).ravel()
+    parameters["vertex_normals"] = scene.surface.normals(scene.eye, directions).astype(np.float32).ravel()
+    parameters["vertex_texcoords"] = Reflectance.texture_coordinates(arc).astype(np.float32).ravel()
+    parameters.update()
+    return mesh

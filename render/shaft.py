@@ -1,0 +1,54 @@
+"""The needle's shaft: it hides retina from the camera and casts its shadow in the ambient light."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from render.tile import Crop
+from scene import Pose, Scene
+from scene.pose import Array
+from scene.spotlights import Shaft
+
+
+def shaft_shapes(mi: Any, shaft: Shaft) -> dict[str, Any]:
+    """An open cylinder and the cap that faces the retina, to be placed by `place`."""
+    bsdf = {"type": "twosided", "bsdf": {"type": "diffuse", "reflectance": {"type": "uniform", "value": shaft.albedo}}}
+    return {
+        "shaft": {"type": "cylinder", "bsdf": bsdf},
+        "shaft_end": {"type": "disk", "bsdf": bsdf},
+    }
+
+
+def place(mi: Any, parameters: Any, shaft: Shaft, pose: Pose) -> None:
+    """Move the shapes of `shaft_shapes` in a scene's traversed `parameters` to a pose."""
+    end, far = _ends(shaft, pose)
+    radius = shaft.diameter / 2.0
+    up = np.eye(3)[np.argmin(np.abs(pose.axis))]
+    frame = mi.ScalarTransform4f().look_at(origin=end.tolist(), target=far.tolist(), up=up.tolist())
+    parameters["shaft.to_world"] = frame @ mi.ScalarTransform4f().scale([radius, radius, shaft.length])
+    parameters["shaft_end.to_world"] = frame @ mi.ScalarTransform4f().scale([radius, radius, 1.0])
+
+
+def shaft_crop(scene: Scene, shaft: Shaft, pose: Pose) -> Crop:
+    """The part of the frame where the shaft or its shadow can be seen."""
+    light = scene.ambient
+    downwards = -np.array(
+        [np.sin(light.tilt) * np.cos(light.azimuth), np.sin(light.tilt) * np.sin(light.azimuth), np.cos(light.tilt)]
+    )
+    end, far = _ends(shaft, pose)
+    # only what is in front of the camera can be projected
+    top = min(far[2], scene.camera.height - 1.0)
+    if far[2] > top:
+        far = end + (far - end) * (top - end[2]) / (far[2] - end[2])
+    rim = shaft.diameter / 2.0 * np.array([(x, y, z) for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)])
+    body = np.concatenate([p + rim for p in np.linspace(end, far, 64)])
+    reach = scene.eye.intersect(body, downwards)
+    shadow = (body + reach[:, None] * downwards)[np.isfinite(reach)]
+    return Crop.around(scene.camera.project(np.concatenate([body, shadow])), scene.camera.resolution, margin=2.0)
+
+
+def _ends(shaft: Shaft, pose: Pose) -> tuple[Array, Array]:
+    end = pose.apex - shaft.setback * pose.axis
+    return end, end - shaft.length * pose.axis
