@@ -1,23 +1,30 @@
-"""Light: the spotlights' spectrum, and the ambient light of the microscope."""
+"""Light: the spotlights' spectrum, and the ambient light of the microscope.
+
+Every spectrum integrates to 1 over wavelength, so that a power in watts (or an irradiance) is its integral.
+"""
 
 from __future__ import annotations
 
 import math
-from typing import Annotated, Literal
+from pathlib import Path
+from typing import Annotated, Any, Literal
 
-from pydantic import Field, model_validator
+import numpy as np
+from pydantic import BeforeValidator, Field, ValidationInfo, model_validator
 
-from scene.model import Model
+from scene.model import Model, unknown_name
 from scene.quantity import Angle, Irradiance, Wavelength
+from scene.spectrum import Curve, published, read_curve
 
 _Visible = Annotated[Wavelength, Field(ge=300.0, le=1100.0)]
+_Name = Annotated[str, Field(pattern=r"^[\w .+-]{1,40}$")]
 
 
 class FlatBand(Model):
     """Constant spectral power between two wavelengths, nothing outside; it integrates to the stated watts."""
 
     kind: Literal["flat"] = "flat"
-    name: str = Field("white", pattern=r"^[\w .+-]{1,40}$")
+    name: _Name = "white"
     low: _Visible = 400.0
     high: _Visible = 700.0
 
@@ -26,6 +33,102 @@ class FlatBand(Model):
         if self.high <= self.low:
             raise ValueError("high must be above low")
         return self
+
+    @property
+    def spectrum(self) -> Curve:
+        """Spectral density with integral 1 [1/nm]."""
+        return Curve(np.array([self.low, self.high]), np.full(2, 1.0 / (self.high - self.low)))
+
+
+#: tabulated lamps: the column of light_sources.csv, and the band that the lamp is used over [nm]
+LAMPS: dict[str, tuple[str, float, float]] = {
+    "led-b1": ("led_B1_2733K", 380.0, 780.0),
+    "led-b3": ("led_B3_4103K", 380.0, 780.0),
+    "led-b5": ("led_B5_6598K", 380.0, 780.0),
+    "led-v1": ("led_V1_violet", 380.0, 780.0),
+    "xenon": ("xenon_arc", 380.0, 730.0),
+    "halogen": ("halogen_3200K", 380.0, 1100.0),
+    "ir850": ("ir850", 780.0, 930.0),
+    "ir940": ("ir940", 820.0, 1030.0),
+}
+
+
+class Lamp(Model):
+    """A published spectrum: `led-b3` is a phosphor white LED, `halogen` a 3200 K black body, `ir850` an IR LED.
+
+    Each is cut to the band its source covers, or for the IR LEDs to where it falls below 1e-4 of its peak.
+    """
+
+    kind: Literal["lamp"] = "lamp"
+    name: Literal["led-b1", "led-b3", "led-b5", "led-v1", "xenon", "halogen", "ir850", "ir940"] = "led-b3"
+
+    @property
+    def spectrum(self) -> Curve:
+        """Spectral density with integral 1 [1/nm]."""
+        column, low, high = LAMPS[self.name]
+        return published("light_sources", column).cut(low, high).normalised()
+
+
+class Line(Model):
+    """A laser line: a triangle of full width at half maximum `width` about `wavelength`."""
+
+    kind: Literal["line"] = "line"
+    name: _Name = "line"
+    wavelength: _Visible = 532.0
+    width: Annotated[Wavelength, Field(gt=0.0, le=50.0)] = 1.0
+
+    @property
+    def spectrum(self) -> Curve:
+        """Spectral density with integral 1 [1/nm]."""
+        x = self.wavelength + self.width * np.array([-1.0, 0.0, 1.0])
+        return Curve(x, np.array([0.0, 1.0, 0.0]) / self.width)
+
+
+class MeasuredLight(Model):
+    """A spectrum from the first two columns (wavelength in nm, spectral power in any unit) of a CSV file."""
+
+    kind: Literal["csv"] = "csv"
+    name: _Name = "measured"
+    file: str
+    points: tuple[tuple[float, float], ...] = Field((), max_length=100_000, validate_default=False)
+
+    @model_validator(mode="after")
+    def _a_light(self) -> MeasuredLight:
+        spectrum = self.spectrum
+        if spectrum.low < 300.0 or spectrum.high > 1100.0:
+            raise ValueError(f"{self.file}: wavelengths must lie in 300 to 1100 nm")
+        return self
+
+    @property
+    def spectrum(self) -> Curve:
+        """Spectral density with integral 1 [1/nm]."""
+        if not self.points:
+            raise ValueError(f"{self.file}: holds no spectrum")
+        pairs = np.array(self.points)
+        return Curve(pairs[:, 0], pairs[:, 1]).normalised()
+
+
+Light = FlatBand | Lamp | Line | MeasuredLight
+LIGHTS: dict[str, Light] = {
+    "white": FlatBand(),
+    **{name: Lamp.model_validate({"name": name}) for name in LAMPS},
+    "line532": Line(name="line532", wavelength=532.0),
+    "line660": Line(name="line660", wavelength=660.0),
+}
+
+
+def _named_light(value: Any, info: ValidationInfo) -> Any:
+    if isinstance(value, str):
+        if value not in LIGHTS:
+            raise unknown_name(value, list(LIGHTS), "light")
+        return LIGHTS[value]
+    if isinstance(value, dict) and value.get("kind") == "csv" and "points" not in value and "file" in value:
+        folder = Path((info.context or {}).get("folder", "."))
+        value = {**value, "points": read_curve(folder / str(value["file"]))}
+    return value
+
+
+Illumination = Annotated[Annotated[Light, Field(discriminator="kind")], BeforeValidator(_named_light)]
 
 
 class Ambient(Model):
@@ -38,4 +141,4 @@ class Ambient(Model):
     irradiance: Irradiance = Field(0.23 * math.pi, ge=0.0)
     tilt: Annotated[Angle, Field(ge=0.0, lt=math.pi / 4.0)] = 0.0
     azimuth: Angle = 0.0
-    illumination: FlatBand = FlatBand()
+    illumination: Illumination = FlatBand()

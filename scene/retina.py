@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Literal
+from typing import Annotated, Any, Literal
 
-from pydantic import Field, model_validator
+from pydantic import BeforeValidator, Field, model_validator
 
-from scene.model import Model
+from scene.model import Model, unknown_name
 
 _Albedo = Annotated[float, Field(gt=0.0, le=1.0)]
 
@@ -37,4 +37,59 @@ class PhotoRetina(Model):
         return self
 
 
-Retina = Annotated[UniformRetina | PhotoRetina, Field(discriminator="kind")]
+class FundusSite(Model):
+    """Lambertian, everywhere the spectral reflectance of one site of Delori & Pflibsen's table (scene.fundus)."""
+
+    kind: Literal["site"] = "site"
+    site: Literal["nasal", "perifovea", "fovea"] = "perifovea"
+
+
+class Glint(Model):
+    """Mirror reflection of the inner limiting membrane: a dielectric coat over the retina.
+
+    Tissue of `index` under vitreous of index 1.336; `roughness` is the alpha of a GGX distribution.
+    """
+
+    index: float = Field(1.38, gt=1.0, le=2.0)
+    roughness: float = Field(0.15, gt=0.0, le=1.0)
+
+
+class Fundus(Model):
+    """A living fundus: spectral reflectance from maps of pigments, blood, vessels and disc.
+
+    The maps come from a fundus photograph or, seeded, from nothing but anatomy (`procedural`: another seed is
+    another eye). `pigmentation` sets the melanin, `detail` the relative amplitude of the mosaic finer than the maps.
+    """
+
+    kind: Literal["fundus"] = "fundus"
+    source: Literal["photo", "procedural"] = "photo"
+    seed: int = Field(0, ge=0, lt=2**32)
+    pigmentation: Literal["light", "medium", "dark"] = "medium"
+    vessels: bool = True
+    artery_saturation: float = Field(0.97, ge=0.0, le=1.0)
+    vein_saturation: float = Field(0.60, ge=0.0, le=1.0)
+    detail: float = Field(0.06, ge=0.0, le=0.3)
+    glint: Glint | None = None
+
+
+def _named_retina(value: Any) -> Any:
+    if isinstance(value, str):
+        if value not in RETINAS:
+            raise unknown_name(value, list(RETINAS), "retina")
+        return RETINAS[value]
+    return value
+
+
+AnyRetina = UniformRetina | PhotoRetina | FundusSite | Fundus
+RETINAS: dict[str, AnyRetina] = {
+    "uniform": UniformRetina(),
+    "photo": PhotoRetina(),
+    "fundus": Fundus(),
+    "fundus-light": Fundus(pigmentation="light"),
+    "fundus-dark": Fundus(pigmentation="dark"),
+    "fundus-procedural": Fundus(source="procedural"),
+    "nasal": FundusSite(site="nasal"),
+    "perifovea": FundusSite(site="perifovea"),
+    "fovea": FundusSite(site="fovea"),
+}
+Retina = Annotated[Annotated[AnyRetina, Field(discriminator="kind")], BeforeValidator(_named_retina)]

@@ -1,0 +1,124 @@
+"""Retinal exposure to a spotlight against ISO 15004-2:2007, Group 1. A research estimate, not a safety assessment.
+
+Weights: Annex A, Table A.1 of the 2007 edition, which the 2024 edition supersedes. The limits are halved, as that
+edition asks for endoilluminators. The guide value of 10 J/cm2 for a potential hazard is unverified.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from scene.pose import Pose
+from scene.scene import Scene
+from scene.spectrum import Curve, mean_of, published
+from scene.spotlights import spotlight_axes
+
+LABEL = "2007 edition, research estimate, not a safety assessment"
+#: Group 1 limits [W/m2], halved for endoilluminators: A-weighted 220 uW/cm2, R-weighted 0.7 W/cm2
+PHOTOCHEMICAL_LIMIT = 2.2 / 2.0
+THERMAL_LIMIT = 7000.0 / 2.0
+#: guide value of the A-weighted radiant exposure [J/m2], 10 J/cm2
+GUIDE_EXPOSURE = 1e5
+
+
+@dataclass(frozen=True)
+class RetinalExposure:
+    """Peak irradiance on the retina [W/m2], unweighted and weighted, and what follows from it."""
+
+    irradiance: float
+    photochemical: float  #: A-weighted (aphakic), 305 to 700 nm
+    thermal: float  #: R-weighted, 380 to 1400 nm
+
+    @property
+    def photochemical_ratio(self) -> float:
+        """A-weighted irradiance over its limit; above 1 the limit is exceeded."""
+        return self.photochemical / PHOTOCHEMICAL_LIMIT
+
+    @property
+    def thermal_ratio(self) -> float:
+        """R-weighted irradiance over its limit; above 1 the limit is exceeded."""
+        return self.thermal / THERMAL_LIMIT
+
+    @property
+    def seconds_to_guide(self) -> float:
+        """Time on one place until the A-weighted exposure reaches 10 J/cm2 [s]; infinite without any such light."""
+        return GUIDE_EXPOSURE / self.photochemical if self.photochemical > 0.0 else math.inf
+
+    @property
+    def sentence(self) -> str:
+        """One line for a plan or a report, with its label."""
+        seconds = self.seconds_to_guide
+        time = (
+            f"10 J/cm2 A-weighted after {seconds / 60.0:.3g} min" if math.isfinite(seconds) else "no A-weighted light"
+        )
+        return (
+            f"peak retinal irradiance {self.irradiance / 10.0:.3g} mW/cm2; A-weighted {self.photochemical / 10.0:.3g} "
+            f"mW/cm2 ({self.photochemical_ratio:.3g} x limit), R-weighted {self.thermal / 10.0:.3g} mW/cm2 "
+            f"({self.thermal_ratio:.3g} x limit); {time} ({LABEL})"
+        )
+
+
+def hazard_fractions(spectrum: Curve) -> tuple[float, float]:
+    """A- and R-weighted power over power of a light. Wavelengths where a weight is not tabulated do not count."""
+    photochemical = published("iso15004_2_2007_weights", "A_aphakic").cut(305.0, 700.0)
+    return mean_of(spectrum, photochemical), mean_of(spectrum, published("iso15004_2_2007_weights", "R_thermal"))
+
+
+def exposure(irradiance: float, spectrum: Curve) -> RetinalExposure:
+    """The exposure of an irradiance [W/m2] of a light of this spectrum."""
+    photochemical, thermal = hazard_fractions(spectrum)
+    return RetinalExposure(irradiance, irradiance * photochemical, irradiance * thermal)
+
+
+def disc_irradiance(flux: float, half_angle: float, distance: float) -> float:
+    """Mean irradiance [W/m2] of a flux [W] on the disc a cone cuts from a plane `distance` [mm] away, across it."""
+    radius = distance * 1e-3 * math.tan(half_angle)
+    return flux / (math.pi * radius * radius)
+
+
+def peak_irradiance(scene: Scene, pose: Pose, power_w: float) -> float:
+    """Largest irradiance [W/m2] on the retina of all spotlights together, each at `power_w`, from one pose.
+
+    Searched on a polar grid of directions in each cone; spotlights that overlap add up. Bumps are included.
+    """
+    axes = spotlight_axes(pose, scene.spotlights)
+    intensity = scene.power.model_copy(update={"value": power_w}).axial_intensity(scene.beam)
+    points = np.concatenate([_cone_points(scene, pose, axis) for axis in axes])
+    points = points[np.all(np.isfinite(points), axis=-1)]
+    return float(np.max(_irradiance(scene, pose, axes, points), initial=0.0) * intensity)
+
+
+def scene_exposure(scene: Scene, poses: list[Pose], power_w: float) -> RetinalExposure:
+    """The worst exposure over poses, with each spotlight at `power_w` [W] in the scene's convention."""
+    worst = max((peak_irradiance(scene, pose, power_w) for pose in poses), default=0.0)
+    return exposure(worst, scene.illumination.spectrum)
+
+
+def _cone_points(scene: Scene, pose: Pose, axis: ArrayLike) -> NDArray[np.float64]:
+    a = np.asarray(axis, float)
+    helper = np.eye(3)[np.argmin(np.abs(a))]
+    u = np.cross(a, helper) / np.linalg.norm(np.cross(a, helper))
+    v = np.cross(a, u)
+    tilt = np.linspace(0.0, 1.0, 13) * scene.beam.half_angle
+    phi = np.linspace(0.0, 2.0 * math.pi, 24, endpoint=False)
+    t, p = (m.ravel() for m in np.meshgrid(tilt, phi))
+    rays = np.cos(t)[:, None] * a + np.sin(t)[:, None] * (np.cos(p)[:, None] * u + np.sin(p)[:, None] * v)
+    return scene.surface.intersect(scene.eye, pose.apex, rays)
+
+
+def _irradiance(
+    scene: Scene, pose: Pose, axes: NDArray[np.float64], points: NDArray[np.float64]
+) -> NDArray[np.float64]:
+    """Irradiance [1/m2] of all spotlights of axial intensity 1 W/sr at surface points `[N, 3]` [mm]."""
+    offset = points - pose.apex
+    distance = np.linalg.norm(offset, axis=-1)
+    ray = offset / distance[:, None]
+    outward = points - scene.eye.centre
+    normal = scene.surface.normals(scene.eye, outward / np.linalg.norm(outward, axis=-1, keepdims=True))
+    cosine = np.maximum(-np.sum(normal * ray, axis=-1), 0.0)
+    relative = sum(scene.beam.intensity(np.clip(ray @ axis, -1.0, 1.0)) for axis in axes)
+    return np.asarray(relative * cosine / (distance * 1e-3) ** 2)
