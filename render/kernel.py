@@ -119,7 +119,7 @@ def load() -> tuple[Any, Any, Kernel]:
         raise KernelError(f"{VARIANT_OVERRIDE}={wanted}: no such variant; this Mitsuba has {', '.join(mi.variants())}")
     if wanted:
         variant, remark = wanted, f"{VARIANT_OVERRIDE} is set; {remark}"
-    elif "cuda_ad_spectral" in mi.variants() and dr.has_backend(dr.JitBackend.CUDA):
+    elif "cuda_ad_spectral" in mi.variants() and _cuda_driver() and dr.has_backend(dr.JitBackend.CUDA):
         variant = "cuda_ad_spectral"
     elif llvm is not None and dr.has_backend(dr.JitBackend.LLVM):
         variant = "llvm_ad_spectral"
@@ -129,6 +129,15 @@ def load() -> tuple[Any, Any, Kernel]:
     mi.set_variant(variant)
     mi.set_log_level(mi.LogLevel.Error)
     return mi, dr, Kernel(variant, remark, str(llvm or "none"), mi.__version__, dr.__version__)
+
+
+def _cuda_driver() -> bool:
+    """Whether a CUDA driver is installed; asked before Dr.Jit is, which complains on stderr where LLVM is missing."""
+    try:
+        ctypes.CDLL("nvcuda.dll" if sys.platform == "win32" else "libcuda.so.1")
+    except OSError:
+        return False
+    return True
 
 
 def use_threads(count: int) -> None:

@@ -57,7 +57,8 @@ class Pose:
     @property
     def azimuth(self) -> float:
         """Direction of the needle's horizontal part, tip to RCM, the paper's rotation about Z [rad]."""
-        return math.atan2(-float(self.axis[1]), -float(self.axis[0]))
+        # 0.0 - 0.0 is 0.0 where -0.0 would give pi: a vertical needle has azimuth 0
+        return math.atan2(0.0 - float(self.axis[1]), 0.0 - float(self.axis[0]))
 
     def rotation(self) -> Array:
         """Rz(azimuth) Ry(tilt) Rz(roll) `[3, 3]`: takes (0, 0, -1) to the axis."""
