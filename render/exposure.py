@@ -8,11 +8,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from render import emva
 from render.tile import Crop, Tile
-from scene.sensor import Sensor, Srgb8
+from scene.emva import Emva
+from scene.sensor import Linear, Sensor, Srgb8
 
 
-def encode(radiance: NDArray[np.floating[Any]], sensor: Sensor) -> NDArray[np.uint8] | NDArray[np.uint16]:
+def encode(radiance: NDArray[np.floating[Any]], sensor: Srgb8 | Linear) -> NDArray[np.uint8] | NDArray[np.uint16]:
     """Pixel values of radiances [W m-2 sr-1], any shape: clipped at white, transferred, rounded to whole numbers.
 
     `srgb8` follows IEC 61966-2-1; `linear` is proportional.
@@ -26,22 +28,59 @@ def encode(radiance: NDArray[np.floating[Any]], sensor: Sensor) -> NDArray[np.ui
 
 
 class Exposure:
-    """Exposes frames over one background `[H, W, C]` [W m-2 sr-1]: only what the tiles touch is computed anew."""
+    """Exposes frames over one background `[H, W, C]`, in W m-2 sr-1, or A m-2 sr-1 for an EMVA 1288 camera.
+
+    Without noise only what the tiles touch is computed anew; a noisy frame is new everywhere.
+    """
 
     def __init__(self, background: NDArray[np.float32], sensor: Sensor) -> None:
         self._background = background
         self._sensor = sensor
-        self._encoded = np.concatenate([encode(band, sensor) for band in np.array_split(background, 16)])
+        if not isinstance(sensor, Emva):
+            self._encoded = np.concatenate([encode(band, sensor) for band in np.array_split(background, 16)])
 
-    def frame(self, tiles: Sequence[Tile], power_w: float) -> NDArray[np.uint8] | NDArray[np.uint16]:
-        """The image `[H, W]`, or `[H, W, C]` of several channels, with every spotlight at `power_w` [W]."""
-        image = self._encoded.copy()
+    def frame(self, tiles: Sequence[Tile], power_w: float, seed: int = 0) -> NDArray[np.uint8] | NDArray[np.uint16]:
+        """The image `[H, W]`, or `[H, W, C]` of several channels, with every spotlight at `power_w` [W].
+
+        `seed` decides the noise of an EMVA 1288 camera; a Bayer camera's raw frame is interpolated to three channels.
+        """
         lit = [tile for tile in tiles if tile.radiance.size]
+        if isinstance(self._sensor, Emva):
+            return self._noisy(self._sensor, lit, power_w, seed)
+        image = self._encoded.copy()
         if lit:
-            crop, total = merged(lit)
-            radiance = self._background[crop.slices] + np.float32(power_w) * total
+            crop, radiance = self._lit(lit, power_w)
             image[crop.slices] = encode(radiance, self._sensor)
         return image[..., 0] if image.shape[-1] == 1 else image
+
+    def metered(self, tiles: Sequence[Tile], power_w: float) -> Sensor:
+        """The sensor with the exposure time that its metering asks for in this frame, and keeps; else as it is."""
+        lit = [tile for tile in tiles if tile.radiance.size]
+        if not isinstance(self._sensor, Emva) or self._sensor.metering is None or not lit:
+            return self._sensor
+        _, signal = self._lit(lit, power_w)
+        reached = merged(lit)[1].max(axis=-1) > 0.0
+        time = emva.metered_time(signal[reached], self._sensor)
+        return self._sensor.model_copy(update={"exposure_time": time})
+
+    def _lit(self, tiles: Sequence[Tile], power_w: float) -> tuple[Crop, NDArray[np.float32]]:
+        crop, total = merged(tiles)
+        return crop, self._background[crop.slices] + np.float32(power_w) * total
+
+    def _noisy(
+        self, sensor: Emva, lit: Sequence[Tile], power_w: float, seed: int
+    ) -> NDArray[np.uint8] | NDArray[np.uint16]:
+        if sensor.metering is not None and sensor.metering.each == "frame":
+            metered = self.metered(lit, power_w)
+            assert isinstance(metered, Emva)
+            sensor = metered
+        signal = self._background
+        if lit:
+            crop, radiance = self._lit(lit, power_w)
+            signal = signal.copy()
+            signal[crop.slices] = radiance
+        raw = emva.expose(signal, sensor, seed)
+        return emva.demosaic(raw) if signal.shape[-1] == 3 else raw
 
 
 def merged(tiles: Sequence[Tile]) -> tuple[Crop, NDArray[np.float32]]:

@@ -6,6 +6,7 @@ from typing import Annotated, Any, Literal
 
 from pydantic import BeforeValidator, Field
 
+from scene.emva import EMVA_PRESETS, Emva, PresetOrEmva
 from scene.model import Model, unknown_name
 from scene.quantity import Radiance
 
@@ -37,7 +38,8 @@ class Linear(Model):
         return int(2**self.bits - 1)
 
 
-SENSORS: dict[str, Srgb8 | Linear] = {"srgb8": Srgb8(), "linear": Linear()}
+AnySensor = Srgb8 | Linear | Emva
+SENSORS: dict[str, AnySensor] = {"srgb8": Srgb8(), "linear": Linear(), **EMVA_PRESETS}
 
 
 def _named_sensor(value: Any) -> Any:
@@ -48,4 +50,10 @@ def _named_sensor(value: Any) -> Any:
     return value
 
 
-Sensor = Annotated[Annotated[Srgb8 | Linear, Field(discriminator="kind")], BeforeValidator(_named_sensor)]
+def sensor_name(sensor: AnySensor) -> str:
+    """The name of a preset, or the kind (for a camera its chip) of a sensor of one's own."""
+    named = (name for name, known in SENSORS.items() if known == sensor)
+    return next(named, sensor.chip if isinstance(sensor, Emva) else sensor.kind)
+
+
+Sensor = Annotated[Annotated[AnySensor, Field(discriminator="kind")], PresetOrEmva, BeforeValidator(_named_sensor)]
