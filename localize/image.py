@@ -1,0 +1,59 @@
+"""The image a localizer is given: checked, and turned to eight bits of grey for those that threshold."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import cv2
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from scene import InputError, Scene
+
+AnyImage = NDArray[Any]  #: `[H, W]` or `[H, W, 3]` (RGB)
+
+
+def checked(image: ArrayLike, scene: Scene) -> AnyImage:
+    """The image `[H, W]` or `[H, W, 3]` as an array that belongs to the scene's camera.
+
+    Raises InputError for another shape or data type, NaN or infinite pixels, and a size other than the camera's.
+    """
+    array = np.asarray(image)
+    kind_known = array.dtype in (np.uint8, np.uint16) or np.issubdtype(array.dtype, np.floating)
+    if not kind_known:
+        raise InputError(f"image: pixels of type {array.dtype} cannot be read; give uint8, uint16 or float")
+    if not (array.ndim == 2 or (array.ndim == 3 and array.shape[2] == 3)):
+        raise InputError(f"image: shape {array.shape} is neither [H, W] nor [H, W, 3]")
+    side = scene.camera.resolution
+    if array.shape[:2] != (side, side):
+        height, width = array.shape[:2]
+        raise InputError(
+            f"image: {width} x {height} px do not fit scene.camera.resolution = {side} px; "
+            "give the whole frame, or the scene of the camera that took it"
+        )
+    if array.dtype.kind == "f" and not np.isfinite(array).all():
+        raise InputError("image: has pixels that are NaN or infinite; mask or repair them first")
+    return array
+
+
+def grey8(image: AnyImage, scene: Scene) -> NDArray[np.uint8]:
+    """The checked image as `[H, W]` grey values of 0 to 255, colours (RGB) weighted 0.299, 0.587, 0.114.
+
+    White is 255 for uint8 and 1.0 for float; for uint16, and for sensors of less than eight bits, it is the
+    sensor's full scale.
+    """
+    array = np.ascontiguousarray(image)
+    if array.dtype.kind == "f":
+        array = array.astype(np.float32, copy=False)
+    if array.ndim == 3:
+        array = cv2.cvtColor(array, cv2.COLOR_RGB2GRAY)
+    if array.dtype.kind == "f":
+        return _scaled(np.maximum(array, 0.0), 255.0)
+    white = scene.sensor.full_scale if array.dtype == np.uint16 else min(255, scene.sensor.full_scale)
+    if array.dtype == np.uint8 and white == 255:
+        return np.asarray(array, np.uint8)
+    return _scaled(array, 255.0 / white)
+
+
+def _scaled(array: NDArray[Any], factor: float) -> NDArray[np.uint8]:
+    return np.asarray(cv2.convertScaleAbs(array, alpha=factor), np.uint8)

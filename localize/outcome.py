@@ -1,0 +1,48 @@
+"""What a localizer answers: a localization, or the reason why there is none."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+
+#: reasons of the published methods; a reason is counted by its text, so it carries no numbers
+NOTHING_FOUND: Final = "nothing found: no patch stands out of the background"
+FEWER_PATCHES: Final = "fewer patches than spotlights"
+CUT_BY_BORDER: Final = "patch cut by the image border"
+NO_INTERSECTION: Final = "no real intersection: the outline leaves the eye"
+NO_ELLIPSE: Final = "no ellipse fits the outline"
+NEAR_CIRCLE: Final = "near-circle: the outline does not tell where the cone leans"
+
+
+@dataclass(frozen=True, eq=False)
+class Localization:
+    """Where the tip is and where the needle points; truthy.
+
+    `apex_mm` is the tip `[3]` [mm] and `axis` the needle's unit axis into the light `[3]`. `covariance`, where the
+    localizer knows it, is `[5, 5]` over the apex [mm] and the axis's components [rad] along the first two columns
+    of `Pose.rotation()`, or `[6, 6]` with the roll [rad] behind them. `spread_mm` is the root mean square distance
+    of several spotlights' positions from their mean, None where there was one estimate.
+    """
+
+    apex_mm: Array
+    axis: Array
+    covariance: Array | None = None
+    spread_mm: float | None = None
+
+
+@dataclass(frozen=True)
+class LocalizationFailure:
+    """The frame cannot be localized; falsy. `reason` is a short sentence, the same for every frame of its kind."""
+
+    reason: str
+
+    def __bool__(self) -> bool:
+        return False
+
+
+Outcome = Localization | LocalizationFailure
