@@ -1,0 +1,87 @@
+"""Box statistics: Tukey's boxes of every group and metric, kept as data so that figures need nothing else.
+
+Quartiles interpolate linearly between values. The whiskers end at the farthest values within 1.5 interquartile
+ranges of the box (Tukey); values beyond them are the outliers. The paper's captions call the whiskers minimum and
+maximum and draw outliers as well, which cannot both hold, so min and max are stored too.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pandas as pd
+from numpy.typing import ArrayLike
+
+from results.rows import METRICS, Rows
+
+WHISKER_IQR = 1.5
+STATISTICS = (
+    "n",
+    "failed",
+    "mean",
+    "median",
+    "q1",
+    "q3",
+    "whisker_low",
+    "whisker_high",
+    "min",
+    "max",
+    "outliers",
+)
+
+
+def box_statistics(values: ArrayLike, failed: int = 0) -> dict[str, Any]:
+    """Tukey's box of the finite `values` `[n]` of the frames that were localized, beside the number that failed.
+
+    `outliers` is the sorted list of values beyond the whiskers. With no value every statistic is NaN.
+    """
+    x = np.sort(np.asarray(values, float))
+    if x.size == 0:
+        nothing = dict.fromkeys(STATISTICS[2:-1], math.nan)
+        return {"n": 0, "failed": failed, **nothing, "outliers": []}
+    q1, median, q3 = np.quantile(x, (0.25, 0.5, 0.75))
+    reach = WHISKER_IQR * (q3 - q1)
+    inside = x[(x >= q1 - reach) & (x <= q3 + reach)]
+    # an interpolated quartile may have no value between itself and its fence: the whisker then has no length
+    low, high = min(inside[0], q1), max(inside[-1], q3)
+    return {
+        "n": int(x.size),
+        "failed": failed,
+        "mean": float(np.clip(x.mean(), x[0], x[-1])),  # rounding may put the mean of equal values beside them
+        "median": float(median),
+        "q1": float(q1),
+        "q3": float(q3),
+        "whisker_low": float(low),
+        "whisker_high": float(high),
+        "min": float(x[0]),
+        "max": float(x[-1]),
+        "outliers": [float(v) for v in x[(x < low) | (x > high)]],
+    }
+
+
+def box_table(rows: Rows) -> pd.DataFrame:
+    """A box of every metric of every group: the group's columns, `metric`, then `STATISTICS`."""
+    found: list[dict[str, Any]] = []
+    for key, part in rows.frame.groupby(list(rows.group), sort=True):
+        located = part[part["status"] == "ok"]
+        setting = dict(zip(rows.group, key, strict=True))
+        failed = len(part) - len(located)
+        found += [{**setting, "metric": name, **box_statistics(located[name], failed)} for name in METRICS]
+    return pd.DataFrame(found, columns=[*rows.group, "metric", *STATISTICS])
+
+
+def encode_boxes(boxes: pd.DataFrame) -> bytes:
+    """The boxes as CSV; outliers as a JSON list, numbers to nine digits."""
+    written = boxes.assign(outliers=[json.dumps([float(f"{v:.9g}") for v in row]) for row in boxes["outliers"]])
+    return written.to_csv(index=False, float_format="%.9g", lineterminator="\n").encode()
+
+
+def read_boxes(path: Path, rows: Rows) -> pd.DataFrame:
+    """The boxes of `rows` that `encode_boxes` wrote to a file."""
+    kinds: dict[str, Any] = {name: str for name in rows.group if rows.frame[name].dtype == object}
+    boxes = pd.read_csv(path, dtype=kinds, keep_default_na=False, na_values={name: [""] for name in STATISTICS[:-1]})
+    return boxes.assign(outliers=[json.loads(row) for row in boxes["outliers"]])

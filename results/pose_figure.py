@@ -1,0 +1,97 @@
+"""Figures 8 and 9: the errors pose by pose along a trajectory, per axis and overall."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pandas as pd
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+from matplotlib.ticker import MaxNLocator
+
+from results.published import published_value
+from results.style import COLOURS, frame, panel_title, plain_numbers
+from results.variants import ordered
+
+#: per row of panels: what it shows, its unit, the signed parts, the overall error, its published source
+_PANELS = (
+    ("Position", "mm", {"x": "error_x_mm", "y": "error_y_mm", "z": "error_z_mm"}, "position_error_mm"),
+    ("Rotation", "deg", {"about Y": "error_rot_y_deg", "about Z": "error_rot_z_deg"}, "rotation_error_deg"),
+)
+_MOST_RIGS = 4
+_LOG_ABOVE = 30.0  #: an error this many times the 75 % quantile would press all others flat
+
+
+def pose_figure(rows: pd.DataFrame, title: str, caption: str, source: str | None) -> Figure:
+    """Panels of position and rotation errors (rows) by spotlight rig (columns) over the pose number.
+
+    `rows` are those of one variant, surface, trajectory and power; `source` names the table whose AE is drawn.
+    """
+    rigs = ordered(rows["spotlights"])[:_MOST_RIGS]
+    figure = Figure(figsize=(1.2 + 4.6 * max(len(rigs), 1.35), 6.6), layout="constrained")
+    frame(figure, title, caption)
+    grid = figure.subplots(len(_PANELS), len(rigs), sharex=True, sharey="row", squeeze=False)
+    for row, (what, unit, parts, overall) in enumerate(_PANELS):
+        for column, rig in enumerate(rigs):
+            axes = grid[row, column]
+            panel_title(axes, row * len(rigs) + column, what, rig)
+            _draw(axes, rows[rows["spotlights"] == rig], parts, overall, source, rig)
+        linear_to = _scale(grid[row, 0], rows, [*parts.values(), overall])
+        beyond = f"\nlogarithmic beyond ±{linear_to:g}" if linear_to else ""
+        grid[row, 0].set_ylabel(f"{what.lower()} error [{unit}]{beyond}")
+        _legend(grid[row, -1], [*parts, "overall"], source)
+    figure.align_ylabels(grid[:, 0])
+    for axes in grid[-1]:
+        axes.set_xlabel("pose along the trajectory")
+    return figure
+
+
+def _draw(axes: Axes, rows: pd.DataFrame, parts: dict[str, str], overall: str, source: str | None, rig: str) -> None:
+    rows = rows.sort_values("pose")
+    located = rows["status"] == "ok"
+    axes.axhline(0.0, color="#9AA1AC", linewidth=0.8, zorder=1)
+    for name, column in [*parts.items(), ("overall", overall)]:
+        values = rows[column].where(located)  # a failed pose breaks the line
+        width = 1.8 if name == "overall" else 1.0
+        # a pose between two failed ones has no line
+        axes.plot(rows["pose"], values, ".-", color=COLOURS[name], linewidth=width, markersize=3.0, zorder=3)
+    failed = rows["pose"][~located]
+    if len(failed):
+        strip = axes.get_xaxis_transform()  # at the panel's lower edge, whatever the errors
+        axes.plot(
+            failed, np.full(len(failed), 0.02), "x", color=COLOURS["failed"], transform=strip, markersize=5, zorder=4
+        )
+        axes.set_title(f"× {len(failed)} of {len(rows)} failed", loc="right", color=COLOURS["failed"], fontsize=8.0)
+    known = published_value(source, str(rows["trajectory"].iloc[0]), rig, "AE", overall) if source else None
+    if known is not None:
+        axes.axhline(known, color=COLOURS["paper"], linewidth=1.2, linestyle=(0, (5, 3)), zorder=2)
+    axes.xaxis.set_major_locator(MaxNLocator(integer=True, nbins=8, steps=[1, 2, 5, 10]))
+    axes.margins(x=0.015)
+
+
+def _scale(axes: Axes, rows: pd.DataFrame, columns: list[str]) -> float | None:
+    """Linear, or symmetric-logarithmic where single gross errors would press all others flat. Panels share it.
+
+    Returns where the logarithmic part begins, None if there is none.
+    """
+    errors = rows.loc[rows["status"] == "ok", columns].abs().to_numpy().ravel()
+    if errors.size == 0:
+        axes.set_ylim(-1.0, 1.0)
+        return None
+    typical, most = np.quantile(errors, (0.75, 1.0))
+    if not 0.0 < _LOG_ABOVE * typical < most:
+        return None
+    linear_to = float(10.0 ** math.floor(math.log10(typical)))
+    axes.set_yscale("symlog", linthresh=linear_to)
+    plain_numbers(axes.yaxis)
+    return linear_to
+
+
+def _legend(axes: Axes, names: list[str], source: str | None) -> None:
+    handles = [Line2D([], [], color=COLOURS[name], linewidth=1.8 if name == "overall" else 1.2) for name in names]
+    if source:
+        handles.append(Line2D([], [], color=COLOURS["paper"], linewidth=1.2, linestyle=(0, (5, 3))))
+        names = [*names, f"AE in the paper's {source}"]
+    axes.legend(handles, names, loc="upper left", bbox_to_anchor=(1.01, 1.0), handlelength=1.6)

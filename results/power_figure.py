@@ -1,0 +1,127 @@
+"""Figures 10 and 11: Tukey boxes of the errors over light power, drawn from stored statistics alone."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pandas as pd
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+from matplotlib.patches import Patch
+
+from results.published import REFERENCE_POWER_W, published_value
+from results.style import COLOURS, frame, panel_title, plain_numbers
+from results.variants import ordered
+
+_PANELS = (("Position", "mm", "position_error_mm"), ("Rotation", "deg", "rotation_error_deg"))
+_MOST_RIGS = 4
+_LOG_ABOVE = 12.0  #: largest value over the largest quartile, above which a linear axis shows outliers only
+
+
+def power_figure(boxes: pd.DataFrame, title: str, caption: str, source: str | None) -> Figure:
+    """Panels of position and rotation errors (rows) by spotlight rig (columns), a box for every power.
+
+    `boxes` are those of one variant, surface and trajectory; `source` names the table whose AE at 1 W is drawn.
+    """
+    rigs = ordered(boxes["spotlights"])[:_MOST_RIGS]
+    powers = sorted(boxes["power_w"].unique())
+    wide = max(4.2, 0.9 + 0.42 * len(powers))
+    figure = Figure(figsize=(min(1.6 + wide * max(len(rigs), 1.3), 30.0), 6.8), layout="constrained")
+    frame(figure, title, caption)
+    grid = figure.subplots(len(_PANELS), len(rigs), sharex=True, sharey="row", squeeze=False)
+    for row, (what, unit, metric) in enumerate(_PANELS):
+        here = boxes[boxes["metric"] == metric]
+        _scale(grid[row, 0], here)
+        for column, rig in enumerate(rigs):
+            axes = grid[row, column]
+            panel_title(axes, row * len(rigs) + column, what, rig)
+            _draw(axes, here[here["spotlights"] == rig], powers, metric, source)
+        grid[row, 0].set_ylabel(f"{what.lower()} error [{unit}]")
+    figure.align_ylabels(grid[:, 0])
+    for axes in grid[-1]:
+        axes.set_xticks(range(len(powers)), [f"{power:g}" for power in powers], rotation=0 if len(powers) <= 9 else 90)
+        axes.set_xlim(-0.6, len(powers) - 0.4)
+        axes.set_xlabel("light power [W]")
+    _legend(grid[0, -1], source)
+    return figure
+
+
+def _draw(axes: Axes, boxes: pd.DataFrame, powers: list[float], metric: str, source: str | None) -> None:
+    places = {power: i for i, power in enumerate(powers)}
+    drawn = boxes[boxes["n"] > 0]
+    rig = str(boxes["spotlights"].iloc[0])
+    colour = COLOURS.get(rig, COLOURS["other"])
+    axes.bxp(
+        [_bxp(box) for box in drawn.to_dict("records")],
+        positions=[places[power] for power in drawn["power_w"]],
+        widths=0.56,
+        showmeans=True,
+        patch_artist=True,
+        manage_ticks=False,
+        boxprops={"facecolor": colour + "33", "edgecolor": colour, "linewidth": 1.2},
+        medianprops={"color": colour, "linewidth": 1.8},
+        whiskerprops={"color": colour, "linewidth": 1.0},
+        capprops={"color": colour, "linewidth": 1.0},
+        meanprops={"marker": "o", "markerfacecolor": "#111111", "markeredgecolor": "white", "markersize": 5.0},
+        flierprops={"marker": "x", "markeredgecolor": colour, "markersize": 3.6, "markeredgewidth": 0.8, "alpha": 0.75},
+    )
+    failed = [(places[power], str(n)) for power, n in zip(boxes["power_w"], boxes["failed"], strict=True) if n]
+    for place, text in [(-0.62, "failed"), *failed] if failed else []:
+        axes.annotate(
+            text,
+            (place, 1.0),
+            (0.0, 2.0),
+            xycoords=axes.get_xaxis_transform(),
+            textcoords="offset points",
+            ha="right" if place < 0.0 else "center",
+            fontsize=7.5,
+            color=COLOURS["failed"],
+        )
+    known = published_value(source, str(boxes["trajectory"].iloc[0]), rig, "AE", metric) if source else None
+    if known is not None and REFERENCE_POWER_W in places:
+        axes.plot(
+            places[REFERENCE_POWER_W],
+            known,
+            "D",
+            markersize=6,
+            markerfacecolor="none",
+            color=COLOURS["paper"],
+            zorder=5,
+        )
+
+
+def _bxp(box: dict[Any, Any]) -> dict[str, Any]:
+    """A stored box in matplotlib's words."""
+    words = {"mean": "mean", "med": "median", "q1": "q1", "q3": "q3", "whislo": "whisker_low", "whishi": "whisker_high"}
+    return {**{word: box[name] for word, name in words.items()}, "fliers": np.asarray(box["outliers"], float)}
+
+
+def _scale(axes: Axes, boxes: pd.DataFrame) -> None:
+    """Logarithmic where the outliers lie far beyond the boxes, else linear from zero. Panels share it."""
+    drawn = boxes[boxes["n"] > 0]
+    if drawn.empty:
+        return
+    least = drawn.loc[drawn["min"] > 0.0, "min"].min()
+    if drawn["max"].max() > _LOG_ABOVE * drawn["q3"].max() and least > 0.0 and (drawn["whisker_low"] > 0.0).all():
+        axes.set_yscale("log")
+        plain_numbers(axes.yaxis)
+    else:
+        axes.set_ylim(0.0, 1.05 * drawn["max"].max() or 1.0)
+
+
+def _legend(axes: Axes, source: str | None) -> None:
+    grey = "#4B5563"
+    entries: list[tuple[Any, str]] = [
+        (Patch(facecolor="#4B556333", edgecolor=grey), "quartiles"),
+        (Line2D([], [], color=grey, linewidth=1.8), "median"),
+        (Line2D([], [], color="none", marker="o", markerfacecolor="#111111", markeredgecolor="white"), "mean"),
+        (Line2D([], [], color=grey, linewidth=1.0, marker="|"), "within 1.5 IQR"),
+        (Line2D([], [], color="none", marker="x", markeredgecolor=grey, markersize=4), "outlier"),
+    ]
+    if source:
+        marker = Line2D([], [], color="none", marker="D", markerfacecolor="none", markeredgecolor=COLOURS["paper"])
+        entries.append((marker, f"AE in the paper's\n{source}"))
+    handles, names = zip(*entries, strict=True)
+    axes.legend(handles, names, loc="upper left", bbox_to_anchor=(1.01, 1.0), handlelength=1.6)

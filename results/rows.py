@@ -1,0 +1,218 @@
+"""The rows of a run, hostile until validated: one row per frame and localizer."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import pyarrow as pa
+import pyarrow.csv
+import pyarrow.parquet
+
+from scene import InputError
+
+NAMES = ("trajectory", "spotlights", "illumination", "surface", "sensor", "localizer")
+#: what makes rows comparable, in the order of design.md; swept keys follow it
+GROUP = ("trajectory", "spotlights", "power_w", "illumination", "surface", "sensor", "resolution_px", "localizer")
+METRICS = (
+    "position_error_mm",
+    "error_x_mm",
+    "error_y_mm",
+    "error_z_mm",
+    "error_rot_y_deg",
+    "error_rot_z_deg",
+    "rotation_error_deg",
+    "axis_error_deg",
+)
+_NEVER_NEGATIVE = ("position_error_mm", "rotation_error_deg", "axis_error_deg")
+_WHOLE = {"pose": 0, "resolution_px": 1}
+_TEXT = ("case", *NAMES, "status", "reason")
+_NUMBERS = (
+    "power_w",
+    "resolution_px",
+    "pose",
+    *(f"{kind}_{axis}_mm" for kind in ("true", "est", "error") for axis in "xyz"),
+    "position_error_mm",
+    "error_rot_y_deg",
+    "error_rot_z_deg",
+    "rotation_error_deg",
+    "axis_error_deg",
+)
+COLUMNS = ("case", *GROUP, "pose", "status", "reason", *_NUMBERS[3:])
+
+_MAX_BYTES = 500_000_000
+_MAX_ROWS = 1_000_000
+_MAX_COLUMNS = 200
+_MAX_GROUPS = 50_000
+_MAX_TEXT = 1000
+_MAX_NAME = 200
+_LOCALIZER = re.compile(r"[\w .+-]{1,60}", re.ASCII)
+
+
+@dataclass(frozen=True)
+class Rows:
+    """Validated rows. `frame` has the columns `COLUMNS`, then `swept`; numbers are float64, names text."""
+
+    frame: pd.DataFrame
+    swept: tuple[str, ...] = ()
+
+    @property
+    def group(self) -> tuple[str, ...]:
+        """Columns that make rows comparable."""
+        return (*GROUP, *self.swept)
+
+    def __len__(self) -> int:
+        return len(self.frame)
+
+
+def find_rows(folder: Path) -> Path | None:
+    """The file with a run's rows: errors.parquet, or else errors.csv; None if there is neither."""
+    return next((p for p in (folder / "errors.parquet", folder / "errors.csv") if p.is_file()), None)
+
+
+def read_rows(path: Path, swept: Iterable[str] = ()) -> Rows:
+    """Rows from a parquet or CSV file.
+
+    A column beyond the known ones belongs to a swept key if its name is a dotted path or stands in `swept`; columns
+    that begin with `est_` are the estimator's own and left alone. Raises InputError for a file that cannot be read,
+    is too large, lacks a column, has another one, or holds values of the wrong type or out of bounds.
+    """
+    keys = tuple(swept)
+    table = read_table(path, text=(*_TEXT, *keys))
+    missing = [name for name in COLUMNS if name not in table.column_names]
+    if missing:
+        raise InputError(f"{path}: no column {', '.join(missing)}; a run's rows have all of {', '.join(COLUMNS)}")
+    extra: list[str] = []
+    for name in table.column_names:
+        if name in COLUMNS or name.startswith("est_"):
+            continue
+        if "." not in name and name not in keys:
+            raise InputError(f"{path}: unknown column '{name}'; a swept key's column is named by its dotted path")
+        extra.append(name)
+    data: dict[str, pd.Series] = {}
+    for name in COLUMNS:
+        data[name] = text_column(table, name, path) if name in _TEXT else number_column(table, name, path)
+    for name in extra:
+        data[name] = _swept_column(table, name, path)
+    rows = Rows(pd.DataFrame(data), tuple(extra))
+    _check(rows, path)
+    for name in _WHOLE:
+        rows.frame[name] = rows.frame[name].astype("int64")
+    return rows
+
+
+def read_table(path: Path, text: Sequence[str] = (), max_rows: int = _MAX_ROWS) -> pa.Table:
+    """A parquet or CSV file as a table of bounded size; `text` are the columns a CSV file holds as text.
+
+    Raises InputError.
+    """
+    try:
+        if path.stat().st_size > _MAX_BYTES:
+            raise InputError(f"{path}: larger than {_MAX_BYTES // 1_000_000} MB, which no run's rows need")
+        if path.suffix == ".parquet":
+            with pa.parquet.ParquetFile(path, arrow_extensions_enabled=False) as file:
+                meta = file.metadata
+                inflated = sum(meta.row_group(i).total_byte_size for i in range(meta.num_row_groups))
+                _bound(path, meta.num_rows, meta.num_columns, max_rows)
+                if inflated > 4 * _MAX_BYTES:
+                    raise InputError(f"{path}: unpacks to {inflated // 1_000_000} MB, which no run's rows need")
+                table = file.read()
+        else:
+            table = _read_csv(path, text)
+    except (pa.ArrowException, OSError, UnicodeDecodeError) as error:
+        reason = " ".join(str(getattr(error, "strerror", None) or error).split())
+        raise InputError(f"{path}: cannot be read as {path.suffix[1:]}: {reason[:300]}") from None
+    _bound(path, table.num_rows, table.num_columns, max_rows)
+    if len(set(table.column_names)) < table.num_columns:
+        raise InputError(f"{path}: a column stands twice; every column needs a name of its own")
+    return table
+
+
+def _read_csv(path: Path, text: Sequence[str]) -> pa.Table:
+    with path.open("rb") as stream:
+        header = pa.csv.read_csv(pa.py_buffer(stream.readline(100_000))).column_names
+    types = {name: pa.string() if name in text or "." in name else pa.float64() for name in header}
+    options = pa.csv.ConvertOptions(column_types=types, null_values=["", "nan", "NaN"], strings_can_be_null=False)
+    return pa.csv.read_csv(path, parse_options=pa.csv.ParseOptions(newlines_in_values=True), convert_options=options)
+
+
+def _bound(path: Path, rows: int, columns: int, max_rows: int) -> None:
+    if rows > max_rows or columns > _MAX_COLUMNS:
+        raise InputError(
+            f"{path}: {rows} rows of {columns} columns are more than results reads ({max_rows} of {_MAX_COLUMNS})"
+        )
+
+
+def text_column(table: pa.Table, name: str, path: Path) -> pd.Series:
+    """A column of text, without null. Raises InputError."""
+    kind = table.schema.field(name).type
+    value = kind.value_type if pa.types.is_dictionary(kind) else kind
+    if not (pa.types.is_string(value) or pa.types.is_large_string(value) or pa.types.is_null(value)):
+        raise InputError(f"{path}: the column {name} holds {kind}, not text")
+    values = table.column(name).cast(pa.string()).fill_null("")
+    longest = max((len(v) for v in values.unique().to_pylist()), default=0)
+    if longest > _MAX_TEXT:
+        raise InputError(f"{path}: the column {name} holds a text of {longest} characters; {_MAX_TEXT} is the most")
+    return pd.Series(values.to_numpy(zero_copy_only=False), dtype=object)
+
+
+def number_column(table: pa.Table, name: str, path: Path) -> pd.Series:
+    """A column of numbers as float64, NaN for null. Raises InputError."""
+    kind = table.schema.field(name).type
+    if not (pa.types.is_integer(kind) or pa.types.is_floating(kind) or pa.types.is_null(kind)):
+        raise InputError(f"{path}: the column {name} holds {kind}, not numbers")
+    values = table.column(name).cast(pa.float64(), safe=False)
+    return pd.Series(np.asarray(values.to_numpy(zero_copy_only=False), float))
+
+
+def _swept_column(table: pa.Table, name: str, path: Path) -> pd.Series:
+    """A swept key's values: numbers if all of them are, else text, so CSV and parquet give the same groups."""
+    kind = table.schema.field(name).type
+    if pa.types.is_boolean(kind):
+        return text_column(table.set_column(0, name, table.column(name).cast(pa.string())), name, path)
+    if pa.types.is_integer(kind) or pa.types.is_floating(kind):
+        return number_column(table, name, path)
+    words = text_column(table, name, path)
+    numbers = pd.to_numeric(words, errors="coerce")
+    return numbers if bool(np.isfinite(numbers).all()) else words
+
+
+def _check(rows: Rows, path: Path) -> None:
+    frame = rows.frame
+    _require(frame["status"].isin(("ok", "failed")), "status must be ok or failed", path)
+    for name in rows.group:
+        if frame[name].dtype == object:
+            _check_names(frame[name].unique(), name, path)
+        else:
+            _require(np.isfinite(frame[name]), f"{name} must be a finite number", path)
+    _require(frame["power_w"] >= 0.0, "power_w must not be negative", path)
+    for name, least in _WHOLE.items():
+        whole = (frame[name] >= least) & (frame[name] == np.floor(frame[name])) & (frame[name] < 2**31)
+        _require(whole, f"{name} must be a whole number from {least}", path)
+    failed = frame["status"] == "failed"
+    for name in METRICS:
+        good = np.abs(frame[name]) < 1e9  # false for NaN
+        _require(good | failed, f"{name} must be a number where status is ok", path)
+        if name in _NEVER_NEGATIVE:
+            _require((frame[name] >= 0.0) | failed, f"{name} must not be negative", path)
+    _require(~frame.duplicated(["case", "pose", *rows.group]), "the same case, pose and localizer stand twice", path)
+    groups = len(frame.drop_duplicates(list(rows.group)))
+    if groups > _MAX_GROUPS:
+        raise InputError(f"{path}: {groups} different settings are more than results reads ({_MAX_GROUPS})")
+
+
+def _check_names(names: Iterable[str], column: str, path: Path) -> None:
+    for name in names:
+        if not name.isprintable() or not 1 <= len(name) <= _MAX_NAME:
+            raise InputError(f"{path}: {column} is {name[:40]!r}; it must be 1 to {_MAX_NAME} printable characters")
+        if column == "localizer" and not _LOCALIZER.fullmatch(name):
+            raise InputError(f"{path}: {name[:40]!r} is no localizer's name; letters, digits, space and .+-_ make one")
+
+
+def _require(good: pd.Series, sentence: str, path: Path) -> None:
+    if not good.all():
+        raise InputError(f"{path}: row {int(np.flatnonzero(~good.to_numpy())[0]) + 1}: {sentence}")

@@ -1,0 +1,74 @@
+"""A run folder, read: the resolved campaign, its rows, and the theory table if there is one."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pandas as pd
+
+from results.rows import Rows, find_rows, number_column, read_rows, read_table
+from scene import InputError
+from scene.document import Document, read_document
+
+THEORY_COLUMNS = ("half_angle_deg", "in_plane_um", "distance_3d_um")
+
+
+@dataclass(frozen=True)
+class Run:
+    """What a run folder holds. `rows` or `theory` may be None, not both."""
+
+    folder: Path
+    document: Document
+    rows: Rows | None
+    theory: pd.DataFrame | None
+
+    @property
+    def name(self) -> str:
+        """The campaign's name, or the folder's."""
+        named = self.document.data.get("name")
+        return named if isinstance(named, str) and 0 < len(named) <= 200 else self.folder.resolve().name
+
+    @property
+    def scene(self) -> dict[str, Any]:
+        """The resolved scene as plain data."""
+        scene = self.document.data.get("scene")
+        return scene if isinstance(scene, dict) else {}
+
+
+def load_run(folder: Path) -> Run:
+    """Read and validate a run folder, one's own or somebody else's. Raises InputError."""
+    if not folder.is_dir():
+        raise InputError(f"{folder}: no such run folder; `campaign run NAME --out {folder}` makes one")
+    resolved = folder / "campaign.yaml"
+    if not resolved.is_file():
+        raise InputError(f"{folder}: no campaign.yaml, so nothing says what the rows assume; copy the whole run folder")
+    document = read_document(resolved)
+    path = find_rows(folder)
+    rows = read_rows(path, _swept(document)) if path else None
+    theory = folder / "theory.csv"
+    table = _read_theory(theory) if theory.is_file() else None
+    if table is None and (rows is None or len(rows) == 0):
+        raise InputError(f"{folder}: holds no finished rows (errors.parquet or errors.csv); run the campaign first")
+    return Run(folder, document, rows if rows is not None and len(rows) else None, table)
+
+
+def _swept(document: Document) -> list[str]:
+    """The keys under `sweep`, which holds one product (a mapping) or a list of them."""
+    sweep = document.data.get("sweep")
+    products = sweep if isinstance(sweep, list) else [sweep]
+    return [key for product in products if isinstance(product, dict) for key in product]
+
+
+def _read_theory(path: Path) -> pd.DataFrame:
+    """Cone-sphere curve against ellipse by half angle: columns `THEORY_COLUMNS`. Raises InputError."""
+    table = read_table(path, max_rows=10_000)
+    missing = [name for name in THEORY_COLUMNS if name not in table.column_names]
+    if missing:
+        raise InputError(f"{path}: no column {', '.join(missing)}; Table I needs {', '.join(THEORY_COLUMNS)}")
+    frame = pd.DataFrame({name: number_column(table, name, path) for name in THEORY_COLUMNS})
+    if frame.empty or not np.isfinite(frame.to_numpy()).all() or (frame < 0.0).to_numpy().any():
+        raise InputError(f"{path}: every value must be a non-negative number, and there must be a row")
+    return frame

@@ -1,0 +1,102 @@
+"""How every figure looks, and how it becomes the same bytes again from the same data."""
+
+from __future__ import annotations
+
+import io
+import string
+import textwrap
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+import matplotlib as mpl
+from matplotlib.axes import Axes
+from matplotlib.axis import Axis
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.backends.backend_svg import FigureCanvasSVG
+from matplotlib.figure import Figure
+from matplotlib.ticker import FuncFormatter
+
+from scene.atomic import write_atomically
+
+#: Okabe and Ito's colours, told apart by colour-blind readers too
+COLOURS = {
+    "x": "#D55E00",
+    "y": "#009E73",
+    "z": "#0072B2",
+    "overall": "#222222",
+    "about Y": "#E69F00",
+    "about Z": "#56B4E9",
+    "single": "#0072B2",
+    "triple": "#D55E00",
+    "other": "#009E73",
+    "failed": "#CC3311",
+    "paper": "#8A6FB0",
+    "quiet": "#6B7280",
+}
+_RC: Any = {
+    "text.parse_math": False,  # names come from files: a dollar sign is a dollar sign
+    "font.family": "DejaVu Sans",
+    "font.size": 9.0,
+    "axes.titlesize": 10.0,
+    "axes.labelsize": 9.0,
+    "axes.edgecolor": "#9AA1AC",
+    "axes.linewidth": 0.8,
+    "axes.grid": True,
+    "axes.axisbelow": True,
+    "axes.spines.top": False,
+    "axes.spines.right": False,
+    "grid.color": "#E3E6EA",
+    "grid.linewidth": 0.6,
+    "xtick.color": "#4B5563",
+    "ytick.color": "#4B5563",
+    "xtick.labelsize": 8.0,
+    "ytick.labelsize": 8.0,
+    "legend.frameon": False,
+    "legend.fontsize": 8.5,
+    "svg.hashsalt": "conespot",
+    "path.simplify": True,
+}
+_DPI = 150
+
+
+@contextmanager
+def style() -> Iterator[None]:
+    """Within it figures are made and drawn in the house's style, whatever the user's matplotlibrc says."""
+    with mpl.rc_context():
+        mpl.rcParams.update(mpl.rcParamsDefault)
+        mpl.rcParams.update(_RC)
+        yield
+
+
+def save(figure: Figure, stem: Path) -> list[Path]:
+    """Write `stem`.png and `stem`.svg, without dates or versions. Call it inside `style`. Raises InputError."""
+    png, svg = stem.with_name(stem.name + ".png"), stem.with_name(stem.name + ".svg")
+    image, drawing = io.BytesIO(), io.BytesIO()
+    FigureCanvasAgg(figure)
+    figure.savefig(image, format="png", dpi=_DPI, metadata={"Software": None})
+    FigureCanvasSVG(figure)
+    figure.savefig(drawing, format="svg", metadata={"Date": None, "Creator": None})
+    write_atomically(png, image.getvalue())
+    write_atomically(svg, drawing.getvalue())
+    return [png, svg]
+
+
+def frame(figure: Figure, title: str, caption: str) -> None:
+    """The title above, and below what the figure shows and assumes, so that the file stands alone."""
+    figure.suptitle(title, x=0.012, ha="left", fontsize=11.5, fontweight="bold")
+    width = int(15.5 * figure.get_figwidth())
+    lines = [line for part in caption.splitlines() for line in textwrap.wrap(part, width)]
+    figure.supxlabel("\n".join(lines), x=0.012, ha="left", fontsize=7.5, color=COLOURS["quiet"], linespacing=1.45)
+
+
+def panel_title(axes: Axes, number: int, what: str, rig: str) -> None:
+    """A panel's letter and title, flush left above it."""
+    spotlights = {"single": "single spotlight", "triple": "three spotlights"}.get(rig, rig)
+    axes.set_title(f"({string.ascii_lowercase[number]}) {what}, {spotlights}", loc="left", pad=15.0)
+
+
+def plain_numbers(axis: Axis) -> None:
+    """0.01 instead of a power of ten, on logarithmic axes too."""
+    axis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}".replace("-", "\N{MINUS SIGN}")))

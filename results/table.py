@@ -1,0 +1,93 @@
+"""A table, as data and as people read it: text for the terminal, markdown for documents."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import pandas as pd
+
+_MOST_BLOCKS = 24
+_MOST_LINES = 400
+
+
+@dataclass(frozen=True)
+class Block:
+    """A part of a table for the eye; `notes` say what its numbers assume."""
+
+    heading: str
+    header: tuple[str, ...]
+    lines: tuple[tuple[str, ...], ...]
+    notes: tuple[str, ...]
+
+    @property
+    def flush_right(self) -> tuple[bool, ...]:
+        """Which columns hold numbers."""
+        columns = list(zip(*self.lines, strict=True)) or [()] * len(self.header)
+        return tuple(all(not cell or cell[0] in "–-+.0123456789" for cell in column) for column in columns)
+
+
+@dataclass(frozen=True)
+class Table:
+    """`frame` is the tidy data of tables/`name`.csv, `blocks` the same for the eye."""
+
+    name: str
+    title: str
+    frame: pd.DataFrame
+    blocks: tuple[Block, ...]
+    notes: tuple[str, ...] = ()
+
+    @property
+    def shown(self) -> tuple[Block, ...]:
+        """The blocks that people are shown: a sweep over thousands of values stays readable."""
+        return tuple(
+            Block(block.heading, block.header, block.lines[:_MOST_LINES], block.notes)
+            for block in self.blocks[:_MOST_BLOCKS]
+        )
+
+    @property
+    def left_out(self) -> str:
+        """What `shown` leaves out, in a sentence; empty if nothing."""
+        blocks = len(self.blocks) - len(self.shown)
+        lines = sum(len(block.lines) for block in self.blocks) - sum(len(block.lines) for block in self.shown)
+        return f"{blocks} more blocks ({lines} lines) stand in tables/{self.name}.csv." if lines else ""
+
+    def text(self) -> str:
+        """The table for the terminal, numbers flush right."""
+        parts = [f"{self.title}\n{'=' * len(self.title)}"]
+        for block in self.shown:
+            rows = (block.header, *block.lines)
+            widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
+            lines = [_line(row, widths, block.flush_right) for row in rows]
+            lines.insert(1, "  ".join("-" * width for width in widths))
+            parts.append("\n".join([block.heading, *("  " + line for line in lines), *block.notes]))
+        return "\n\n".join([*parts, *(note for note in (*self.notes, self.left_out) if note)]) + "\n"
+
+    def markdown(self) -> str:
+        """The table as GitHub-flavoured markdown."""
+        parts = [f"## {_escaped(self.title)}"]
+        for block in self.shown:
+            rows = [[_escaped(cell) for cell in row] for row in (block.header, *block.lines)]
+            rows.insert(1, ["--:" if right else "---" for right in block.flush_right])
+            parts.append(f"### {_escaped(block.heading)}")
+            parts.append("\n".join(f"| {' | '.join(row)} |" for row in rows))
+            parts += [_escaped(note) for note in block.notes]
+        return "\n\n".join([*parts, *(_escaped(note) for note in (*self.notes, self.left_out) if note)]) + "\n"
+
+
+def number(value: float) -> str:
+    """A number as people read it: three digits, a dash for none."""
+    return f"{value:.3g}" if math.isfinite(value) else "–"
+
+
+def _line(row: Sequence[str], widths: Sequence[int], flush: Sequence[bool]) -> str:
+    cells = (c.rjust(w) if right else c.ljust(w) for c, w, right in zip(row, widths, flush, strict=True))
+    return "  ".join(cells).rstrip()
+
+
+def _escaped(text: str) -> str:
+    """A run may come from a stranger: nothing in it becomes markup."""
+    for sign in "\\`*_[]<>|#":
+        text = text.replace(sign, f"&#{ord(sign)};" if sign in "<>|" else f"\\{sign}")
+    return text

@@ -1,0 +1,69 @@
+"""Variants: what a run compares beyond the paper's own axes (trajectory, spotlights, power, surface).
+
+One table block and one figure belongs to one variant, so numbers of different localizers, lights, sensors,
+resolutions or swept values are never pooled.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import pandas as pd
+
+from results.rows import GROUP
+
+#: the paper's own axes, which lie inside a table or figure
+AXES = ("surface", "trajectory", "spotlights", "power_w")
+#: surfaces, trajectories and rigs in the order in which the paper shows them; others follow by name
+_ORDER = {name: i for i, name in enumerate(("smooth", "bumps", "box", "helix", "single", "triple"))}
+
+
+@dataclass(frozen=True)
+class Variant:
+    """The values of the group columns beyond `AXES`; `label` names the localizer and whatever varies in the run.
+
+    `slug` is the label as a part of a file name, distinct within the run.
+    """
+
+    setting: dict[str, Any]
+    label: str
+    slug: str
+
+
+def split(frame: pd.DataFrame, group: Sequence[str]) -> list[tuple[Variant, pd.DataFrame]]:
+    """The variants among rows or boxes with these `group` columns, each with its part, in a stable order."""
+    names = ["localizer", *(name for name in group if name not in AXES and name != "localizer")]
+    telling = [name for name in names if name == "localizer" or frame[name].nunique() > 1]
+    found: list[tuple[Variant, pd.DataFrame]] = []
+    taken: set[str] = set()
+    for values, part in frame.groupby(names, sort=True):
+        setting = dict(zip(names, values, strict=True))
+        label = ", ".join(_named(name, setting[name]) for name in telling)
+        slug = re.sub(r"[^A-Za-z0-9.+]+", "-", label).strip("-.")[:100]
+        if slug.lower() in taken or not slug:  # labels that differ in punctuation, case or their far end only
+            slug = f"{slug}-{len(found) + 1}".lstrip("-")
+        taken.add(slug.lower())
+        found.append((Variant(setting, label, slug), part))
+    return found
+
+
+def ordered(values: pd.Series) -> list[Any]:
+    """The distinct values: the paper's names first and in its order, then the rest sorted."""
+    return sorted(values.unique(), key=lambda v: (_ORDER.get(v, len(_ORDER)), v))
+
+
+def by_axes(frame: pd.DataFrame) -> Iterator[tuple[dict[str, Any], pd.DataFrame]]:
+    """The frame's parts of equal surface, trajectory, spotlights and power, in the paper's order."""
+    parts: dict[Any, pd.DataFrame] = dict(iter(frame.groupby(list(AXES), sort=True)))
+    for key in sorted(parts, key=lambda key: [(_ORDER.get(v, len(_ORDER)), v) for v in key]):
+        yield dict(zip(AXES, key, strict=True)), parts[key]
+
+
+def _named(name: str, value: Any) -> str:
+    text = f"{value:g}" if isinstance(value, float) else str(value)
+    if name == "resolution_px":
+        return f"{text} px"
+    return text if name in GROUP else f"{name.removeprefix('scene.')} {text}"

@@ -1,0 +1,77 @@
+"""What a run folder gets: boxes.csv, tables/, figures/, report.html, each file whole or not there."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+from results.boxes import box_table, encode_boxes, read_boxes
+from results.figures import draw_figures, plan_figures
+from results.report import make_report
+from results.run import load_run
+from results.tables import make_tables
+from scene import InputError
+from scene.atomic import write_atomically
+
+_OURS = {
+    "tables": re.compile(r"(table_\d+|power)\.csv|tables\.(txt|md)"),
+    "figures": re.compile(r"(figure_\d+|along|power)_.+\.(png|svg)"),
+}
+_SUMMARY = "tables.txt"
+
+
+def write_results(run: Path) -> list[Path]:
+    """Write box statistics, tables, figures and the report of a run folder; returns the files.
+
+    Reads errors.parquet (or errors.csv), campaign.yaml and theory.csv, nothing else. Tables and figures of an
+    earlier call that the rows no longer give are removed. Raises InputError for a folder that is no run, rows that
+    are not valid, and files that cannot be written.
+    """
+    found = load_run(run)
+    folders = {name: _folder(run / name) for name in _OURS}
+    written: list[Path] = []
+    boxes = None
+    if found.rows is not None:
+        path = run / "boxes.csv"
+        write_atomically(path, encode_boxes(box_table(found.rows)))
+        written.append(path)
+        boxes = read_boxes(path, found.rows)  # what follows rests on what is stored
+    tables = make_tables(found, boxes)
+    texts = {f"{table.name}.csv": table.frame.to_csv(index=False, float_format="%.9g") for table in tables}
+    texts[_SUMMARY] = "\n\n".join(table.text() for table in tables)
+    texts["tables.md"] = "\n".join(table.markdown() for table in tables)
+    for name, text in texts.items():
+        write_atomically(folders["tables"] / name, text.encode())
+        written.append(folders["tables"] / name)
+    drawings, left_out = plan_figures(found, boxes)
+    written += draw_figures(drawings, folders["figures"])
+    report = run / "report.html"
+    write_atomically(report, make_report(found, tables, drawings, left_out, folders["figures"]))
+    _clear(folders, written)
+    return [*written, report]
+
+
+def summary(run: Path) -> str:
+    """The tables that `write_results` wrote, as text for the terminal. Raises InputError if there are none."""
+    path = run / "tables" / _SUMMARY
+    try:
+        return path.read_text(encoding="utf-8")
+    except (OSError, UnicodeDecodeError):
+        raise InputError(f"{path}: cannot be read; `python -m results {run}` writes it") from None
+
+
+def _folder(path: Path) -> Path:
+    if path.is_symlink():  # a stranger's run must not send files elsewhere
+        raise InputError(f"{path}: is a link to somewhere else; remove it")
+    try:
+        path.mkdir(exist_ok=True)
+    except OSError as error:
+        raise InputError(f"{path}: cannot be made: {error.strerror}") from None
+    return path
+
+
+def _clear(folders: dict[str, Path], written: list[Path]) -> None:
+    for name, folder in folders.items():
+        for path in folder.iterdir():
+            if _OURS[name].fullmatch(path.name) and path not in written:
+                path.unlink()

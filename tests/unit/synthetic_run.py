@@ -1,0 +1,103 @@
+"""A run folder without a renderer: rows with known errors, a resolved campaign, and Table I."""
+
+import itertools
+import shutil
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+from ruamel.yaml import YAML
+
+from results.rows import COLUMNS
+from scene.document import read_document, shipped
+
+POWERS = (0.05, 0.1, 0.15, 0.25, 0.5, 0.75, 1.0)
+
+
+def campaign(**changes):
+    scene = read_document(shipped("scene", "presets")["paper-code"]).data
+    document = {
+        "name": "synthetic",
+        "description": "Rows that nobody rendered.",
+        "scene": scene,
+        "trajectory": {"kind": "box"},
+        "poses": 100,
+        "localizers": ["paper-code"],
+        "seed": 7,
+        "made_with": {"conespot": "0.1.0", "mitsuba": "3.9.1"},
+        "sweep": {"trajectory": ["box", "helix"], "scene.power.value": ["0.05 W", "1 W"]},
+    }
+    return {**document, **changes}
+
+
+def rows(
+    poses=25,
+    trajectories=("box", "helix"),
+    rigs=("single", "triple"),
+    powers=POWERS,
+    surfaces=("smooth",),
+    localizers=("paper-code",),
+    failing=0.0,
+    gross=0.0,
+    swept=None,
+):
+    """Errors that fall with power, are smaller with three spotlights and grow with height."""
+    rng = np.random.default_rng(3)
+    parts = []
+    swept = swept or {}
+    settings = itertools.product(trajectories, rigs, powers, surfaces, localizers, *swept.values())
+    for case, (trajectory, rig, power, surface, localizer, *values) in enumerate(settings):
+        u = np.linspace(0.0, 1.0, poses)
+        size = (0.02 + 0.02 * u) * (1.0 + 0.12 / power**0.7) * (0.8 if rig == "triple" else 1.0)
+        size = size * (1.6 if surface == "bumps" else 1.0) * (3.0 if localizer == "paper" else 1.0)
+        along = np.column_stack([np.sin(9 * u), np.cos(7 * u), -2.0 + u]) / 2.5
+        error = size[:, None] * (along + rng.normal(0.0, 0.25, (poses, 3)))
+        error[rng.random(poses) < gross] *= 60.0
+        turn = 4.0 * size[:, None] * (along[:, :2] + rng.normal(0.0, 0.25, (poses, 2)))
+        tip = np.column_stack([2.0 * np.sin(6 * u), 2.0 * np.cos(6 * u), 2.0 + 4.0 * u])
+        ok = rng.random(poses) >= failing
+        part = {
+            "case": f"{case:016x}",
+            "trajectory": trajectory,
+            "spotlights": rig,
+            "power_w": power,
+            "illumination": "white",
+            "surface": surface,
+            "sensor": "srgb8",
+            "resolution_px": 5000,
+            "localizer": localizer,
+            "pose": np.arange(poses),
+            "status": np.where(ok, "ok", "failed"),
+            "reason": np.where(ok, "", "patch cut by the border"),
+        }
+        for i, axis in enumerate("xyz"):
+            part[f"true_{axis}_mm"] = tip[:, i]
+            part[f"est_{axis}_mm"] = np.where(ok, tip[:, i] + error[:, i], np.nan)
+            part[f"error_{axis}_mm"] = np.where(ok, error[:, i], np.nan)
+        part["position_error_mm"] = np.where(ok, np.linalg.norm(error, axis=1), np.nan)
+        part["error_rot_y_deg"], part["error_rot_z_deg"] = np.where(ok[:, None], turn, np.nan).T
+        part["rotation_error_deg"] = np.hypot(part["error_rot_y_deg"], part["error_rot_z_deg"])
+        part["axis_error_deg"] = 0.7 * part["rotation_error_deg"]
+        frame = pd.DataFrame(part)[list(COLUMNS)]
+        parts.append(frame.assign(**dict(zip(swept, values, strict=True))))
+    return pd.concat(parts, ignore_index=True)
+
+
+def write_run(folder: Path, frame=None, *, document=None, theory=False, kind="parquet") -> Path:
+    folder.mkdir(parents=True, exist_ok=True)
+    with (folder / "campaign.yaml").open("w") as stream:
+        YAML(typ="safe", pure=True).dump(document or campaign(), stream)
+    if frame is not None and kind == "parquet":
+        frame.to_parquet(folder / "errors.parquet", index=False)
+    elif frame is not None:
+        frame.to_csv(folder / "errors.csv", index=False)
+    if theory:
+        (folder / "theory.csv").write_text(
+            "half_angle_deg,in_plane_um,distance_3d_um\n"
+            "5,0.08,0.9\n7,0.23,1.9\n9,0.49,3.2\n11,0.90,5.1\n13,1.51,7.6\n15,2.35,10.6\n"
+        )
+    return folder
+
+
+def copy_run(source: Path, target: Path) -> Path:
+    return Path(shutil.copytree(source, target))
