@@ -1,1 +1,1 @@
-"""x."""
+"""Campaigns: YAML to cases to rows. Run them with the command `campaign`."""

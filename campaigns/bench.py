@@ -1,0 +1,113 @@
+"""The bench: where a unit of work is rendered, exposed and localized, in a worker of its own."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from campaigns.plan import Case, Group, Plan, Unit, tile_seed
+from campaigns.row import Finding, Record, Vector
+from scene import Pose
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from numpy.typing import NDArray
+
+    from render import Exposure, Renderer, Tile
+
+#: loading scenes leaks memory in Mitsuba, so a worker that has loaded this many is replaced
+MAX_SCENES = 16
+
+
+class Bench:
+    """Measures units of a plan on one thread; holds one scene at a time. Frames go to `frames` if that is a folder."""
+
+    def __init__(self, plan: Plan, frames: Path | None) -> None:
+        import cv2
+
+        from render import kernel
+
+        cv2.setNumThreads(1)
+        kernel.use_threads(1)
+        self._plan = plan
+        self._frames = frames
+        self._loaded: tuple[str, Renderer, Exposure] | None = None
+        self._scenes = 0
+
+    @property
+    def worn(self) -> bool:
+        """True when the process should make room for a fresh one."""
+        return self._scenes >= MAX_SCENES
+
+    def measure(self, unit: Unit) -> Record:
+        """Render the unit's pose once, expose it at every power, localize every frame with every localizer."""
+        from localize import LocalizationFailure, locate
+
+        group = self._plan.groups[unit.group]
+        pose = group.pose(unit.pose)
+        renderer, exposure = self._scene(group)
+        tiles = [renderer.tile(pose, k, tile_seed(self._plan, unit, k)) for k in range(len(group.scene.spotlights))]
+        if group.scene.instrument.shaft is not None:
+            from render import Exposure
+
+            exposure = Exposure(renderer.background(pose), group.scene.sensor)
+        findings = []
+        for case in group.cases:
+            image = exposure.frame(tiles, case.scene.power.value)
+            for localizer in case.localizers:
+                oracle = pose if localizer.endswith("-oracle") else None
+                found = locate(image, case.scene, localizer, oracle=oracle)
+                if isinstance(found, LocalizationFailure):
+                    findings.append(Finding(case=case.key, localizer=localizer, reason=found.reason[:1000]))
+                    continue
+                findings.append(
+                    Finding(
+                        case=case.key,
+                        localizer=localizer,
+                        apex=_vector(found.apex_mm),
+                        axis=_vector(found.axis),
+                        covariance=None if found.covariance is None else tuple(map(tuple, found.covariance.tolist())),
+                    )
+                )
+            if self._frames is not None:
+                self._keep(case, unit, pose, renderer.background(pose), tiles, image)
+        return Record(unit=unit.key, findings=tuple(findings))
+
+    def _scene(self, group: Group) -> tuple[Renderer, Exposure]:
+        if self._loaded is None or self._loaded[0] != group.scene_key:
+            from render import Exposure, Renderer
+
+            self._loaded = None  # the old scene goes before the new one comes
+            renderer = Renderer(group.scene, samples=group.samples)
+            self._loaded = group.scene_key, renderer, Exposure(renderer.background(), group.scene.sensor)
+            self._scenes += 1
+        return self._loaded[1:]
+
+    def _keep(
+        self,
+        case: Case,
+        unit: Unit,
+        pose: Pose,
+        background: NDArray[np.float32],
+        tiles: Sequence[Tile],
+        image: NDArray[np.uint8] | NDArray[np.uint16],
+    ) -> None:
+        from campaigns.store import made_with
+        from render.frame_file import frame_header, write_frame, write_preview
+
+        assert self._frames is not None
+        power = case.scene.power.value
+        radiance = background.copy()
+        for tile in tiles:
+            radiance[tile.crop.slices] += np.float32(power) * tile.radiance
+        path = self._frames / f"{case.key}-{unit.pose:05d}"
+        write_frame(path.with_suffix(".exr"), radiance, frame_header(case.scene, pose, power, made_with(self._plan)))
+        write_preview(path.with_suffix(".png"), image, case.scene.sensor.full_scale)
+
+
+def _vector(values: NDArray[np.float64]) -> Vector:
+    x, y, z = values.tolist()
+    return x, y, z

@@ -1,0 +1,229 @@
+"""The command `campaign`. Everything heavy is imported where it is used, so that --help is instant."""
+
+from __future__ import annotations
+
+import argparse
+import os
+import signal
+import sys
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from campaigns.ending import Ending, RunError
+
+if TYPE_CHECKING:
+    from scene.document import Document
+
+#: options that set a key of the campaign
+_SETTINGS = {
+    "resolution": ("scene.camera.resolution", "PX", "pixels a side of a frame"),
+    "poses": ("poses", "N", "poses of each trajectory"),
+    "samples": ("samples", "N", "rendering samples a pixel"),
+    "seed": ("seed", "N", "seed of every random number"),
+    "localizers": ("localizers", "A,B", "localizers to use"),
+}
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run a command line; the exit code: 0 done, 1 something failed, 2 bad input, 130 interrupted."""
+    options = _parser().parse_args(arguments)
+    from scene.document import InputError
+
+    try:
+        code: Ending = options.run(options)
+        sys.stdout.flush()
+        return code
+    except InputError as error:
+        return _complain(error, Ending.BAD_INPUT)
+    except KeyboardInterrupt:
+        return _complain("interrupted", Ending.INTERRUPTED)
+    except BrokenPipeError:
+        # the reader of our output went away, `campaign plan | head`
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        return Ending.FAILED
+    except RunError as error:
+        return _complain(error, Ending.FAILED)
+    except Exception as error:
+        # a defect: the user gets a sentence, and the traceback by asking for it
+        if os.environ.get("CONESPOT_TRACEBACK"):
+            raise
+        return _complain(f"{type(error).__name__}: {error} (CONESPOT_TRACEBACK=1 shows where)", Ending.FAILED)
+
+
+def _complain(error: object, code: Ending) -> Ending:
+    sys.stderr.write(f"campaign: {error}\n")
+    return code
+
+
+def _say(text: object) -> None:
+    sys.stdout.write(f"{text}\n")
+
+
+def _parser() -> argparse.ArgumentParser:
+    parser = argparse.ArgumentParser(
+        prog="campaign",
+        description="Render spotlights on a retina, localize the instrument that carries them, compare with the truth.",
+        epilog="exit codes: 0 done, 1 something failed, 2 bad input, 130 interrupted",
+    )
+    commands = parser.add_subparsers(required=True, metavar="COMMAND")
+
+    def add(name: str, run: Callable[[argparse.Namespace], Ending], help_: str) -> argparse.ArgumentParser:
+        command = commands.add_parser(name, help=help_, description=f"{help_[0].upper()}{help_[1:]}.")
+        command.set_defaults(run=run)
+        return command
+
+    run = add("run", _run, "render, localize and compare; an interrupted run is continued")
+    plan = add("plan", _plan, "say what a run would do")
+    validate = add("validate", _validate, "check a campaign and every combination it sweeps over")
+    for command in (run, plan, validate):
+        command.add_argument("campaign", help="a YAML file, or the name of a shipped campaign")
+        command.add_argument(
+            "--set",
+            action="append",
+            default=[],
+            metavar="KEY=VALUE",
+            help="set a key, such as scene.eye.radius='12 mm'",
+        )
+        for name, (_, metavar, text) in _SETTINGS.items():
+            command.add_argument(f"--{name}", metavar=metavar, help=text)
+    run.add_argument("--dry-run", action="store_true", help="only say what the run would do")
+    run.add_argument("--out", metavar="FOLDER", help="the run folder (default: runs/NAME)")
+    for command in (run, plan):
+        command.add_argument(
+            "--workers", metavar="N", type=_workers, default=_cores(), help="processes (default: cores)"
+        )
+    add("list", _list, "list the shipped campaigns")
+    add("show", _show, "print a campaign's file").add_argument("campaign")
+    report = add("report", _report, "make the tables, figures and report of a run folder again")
+    report.add_argument("folder", type=Path, metavar="RUN")
+    add("doctor", _doctor, "say what this machine renders with, and prove it")
+    return parser
+
+
+def _workers(text: str) -> int:
+    count = int(text) if text.isdecimal() else 0
+    if not 1 <= count <= 1024:
+        raise argparse.ArgumentTypeError("must be a whole number from 1 to 1024")
+    return count
+
+
+def _cores() -> int:
+    # a cluster gives a job fewer cores than the machine has
+    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+
+
+def _document(options: argparse.Namespace) -> Document:
+    """The campaign's file with the settings of the command line on it."""
+    from campaigns.schema import override, read_campaign
+    from scene import InputError
+
+    document = read_campaign(options.campaign)
+    for name, (key, _, _) in _SETTINGS.items():
+        value = getattr(options, name)
+        if value is not None:
+            text = f"[{value}]" if name == "localizers" else value
+            document = override(document, key, text, f"--{name}")
+    for setting in options.set:
+        key, equals, value = setting.partition("=")
+        if not equals or not key:
+            raise InputError(f"--set {setting}: write KEY=VALUE, such as --set poses=10")
+        document = override(document, key.strip(), value, f"--set {key.strip()}")
+    return document
+
+
+def _validate(options: argparse.Namespace) -> Ending:
+    from campaigns.plan import make_plan
+
+    plan = make_plan(_document(options))
+    _say(f"{options.campaign}: valid, {len(plan.cases)} cases, {plan.rows} rows")
+    return Ending.DONE
+
+
+def _plan(options: argparse.Namespace) -> Ending:
+    from campaigns.plan import make_plan
+    from campaigns.summary import summary
+
+    _say("\n".join(summary(make_plan(_document(options)), options.workers)))
+    return Ending.DONE
+
+
+def _run(options: argparse.Namespace) -> Ending:
+    from campaigns.plan import make_plan
+    from campaigns.store import open_store
+
+    if options.dry_run:
+        return _plan(options)
+    document = _document(options)
+    plan = make_plan(document)
+    folder = Path(options.out or Path("runs") / plan.campaign.name)
+    # a cluster ends a job with SIGTERM: that is an interruption too
+    signal.signal(signal.SIGTERM, signal.default_int_handler)
+    with open_store(folder, plan, document) as store:
+        code = Ending.DONE
+        if plan.cases:
+            from campaigns.session import measure
+
+            code = measure(plan, store, options.workers)
+        if plan.campaign.theory:
+            from campaigns.session import write_theory
+
+            write_theory(folder)
+    if code != Ending.INTERRUPTED:
+        _write_results(folder)
+    return code
+
+
+def _report(options: argparse.Namespace) -> Ending:
+    from campaigns.plan import make_plan
+    from campaigns.schema import read_campaign
+    from campaigns.store import open_store
+
+    folder: Path = options.folder
+    if (folder / "journal.jsonl").exists() and (folder / "campaign.yaml").exists():
+        document = read_campaign(str(folder / "campaign.yaml"))
+        with open_store(folder, make_plan(document), document) as store:
+            store.write_rows()
+    _write_results(folder)
+    return Ending.DONE
+
+
+def _write_results(folder: Path) -> None:
+    from results import write_results
+
+    for path in write_results(folder):
+        _say(path)
+
+
+def _list(options: argparse.Namespace) -> Ending:
+    from scene.document import read_document, shipped
+
+    for name, path in shipped("campaigns", "").items():
+        _say(f"{name:16} {read_document(path).data.get('description', '')}")
+    return Ending.DONE
+
+
+def _show(options: argparse.Namespace) -> Ending:
+    from scene.document import find_document, read_document
+
+    path = find_document(options.campaign, "campaigns", "", "campaign")
+    read_document(path)
+    sys.stdout.write(path.read_text("utf-8"))
+    return Ending.DONE
+
+
+def _doctor(options: argparse.Namespace) -> Ending:
+    from render.doctor import examine
+    from render.kernel import KernelError
+
+    try:
+        for line in examine():
+            _say(line)
+            sys.stdout.flush()
+    except KernelError as error:
+        raise RunError(str(error)) from None
+    return Ending.DONE
+
+
+if __name__ == "__main__":
+    sys.exit(main())

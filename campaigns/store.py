@@ -1,0 +1,159 @@
+"""The run folder: what is finished, safe from a torn write, a second writer and another campaign's rows.
+
+`journal.jsonl` grows by one line per finished unit, each on the disk before the next; everything else in the folder
+is written whole or not at all, and can be made again from the journal.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import importlib.metadata
+import io
+import os
+import platform
+from collections.abc import Iterator
+from pathlib import Path
+from typing import IO
+
+from campaigns.plan import Plan
+from campaigns.row import Record, rows
+from campaigns.schema import resolved
+from scene import InputError
+from scene.atomic import write_atomically
+from scene.document import Document, dump, read_document
+
+_VERSIONS = ("conespot", "mitsuba", "drjit", "numpy", "scipy", "opencv-python-headless", "karellen-llvm-core")
+_LONGEST_LINE = 1_000_000
+
+
+def made_with(plan: Plan) -> dict[str, str]:
+    """What identifies a run and what it is made with: identity, versions, Python, platform."""
+    versions = {}
+    for package in _VERSIONS:
+        with contextlib.suppress(importlib.metadata.PackageNotFoundError):
+            versions[package] = importlib.metadata.version(package)
+    system = f"{platform.system()} {platform.machine()}"
+    return {"identity": plan.identity, **versions, "python": platform.python_version(), "platform": system}
+
+
+class Store:
+    """The finished units of a run and the file they are appended to. `begun_with` is what began the run."""
+
+    def __init__(self, folder: Path, plan: Plan, journal: IO[bytes], begun_with: dict[str, str]) -> None:
+        self.folder = folder
+        self.plan = plan
+        self.begun_with = begun_with
+        self._journal = journal
+        self.records = _read_journal(folder / "journal.jsonl", plan, journal)
+
+    def append(self, record: Record) -> None:
+        """Keep a finished unit: it is on the disk when this returns. Raises InputError if the disk refuses."""
+        try:
+            self._journal.write(record.model_dump_json(exclude_defaults=True).encode() + b"\n")
+            self._journal.flush()
+            os.fsync(self._journal.fileno())
+        except OSError as error:
+            raise InputError(f"{self.folder}: cannot be written: {error.strerror}; what is finished is kept") from None
+        self.records[record.unit] = record
+
+    def write_rows(self) -> int:
+        """Write errors.csv and errors.parquet of what is finished, in the plan's order; their number of rows."""
+        table = list(rows(self.plan, self.records))
+        if not table:
+            return 0
+        import pandas as pd
+
+        swept = list(self.plan.cases[0].swept)
+        sigmas = sorted({key for row in table for key in row if key.startswith("est_sigma")} - set(swept))
+        standing = [key for key in table[0] if key not in swept and key not in sigmas]
+        frame = pd.DataFrame(table, columns=[*standing, *sigmas, *swept])
+        text = io.StringIO()
+        frame.to_csv(text, index=False, lineterminator="\n")
+        write_atomically(self.folder / "errors.csv", text.getvalue().encode())
+        packed = io.BytesIO()
+        frame.to_parquet(packed, index=False)
+        write_atomically(self.folder / "errors.parquet", packed.getvalue())
+        return len(frame)
+
+
+@contextlib.contextmanager
+def open_store(folder: Path, plan: Plan, document: Document) -> Iterator[Store]:
+    """The run folder of a campaign, begun or continued, for this process alone.
+
+    Raises InputError for a folder that cannot be written, is not a run's, is another campaign's or is in use.
+    """
+    try:
+        _refuse_strangers(folder)
+        folder.mkdir(parents=True, exist_ok=True)
+        journal = open(folder / "journal.jsonl", "a+b")  # noqa: SIM115 - it must outlive this function
+    except OSError as error:
+        raise InputError(f"{folder}: cannot be written: {error.strerror}; choose another --out") from None
+    with journal:
+        _lock(journal, folder)
+        known = folder / "campaign.yaml"
+        if not known.exists():
+            write_atomically(known, dump(resolved(document, made_with(plan))).encode())
+        begun_with = _begun_with(known)
+        if begun_with.get("identity") != plan.identity:
+            raise InputError(f"{folder}: holds the run of another campaign or other settings; choose another --out")
+        yield Store(folder, plan, journal, begun_with)
+
+
+def _refuse_strangers(folder: Path) -> None:
+    if not folder.is_dir():
+        if folder.exists():
+            raise InputError(f"{folder}: is a file, not a run folder; choose another --out")
+        return
+    # hidden files may be what an interrupted start left behind
+    names = {path.name for path in folder.iterdir() if not path.name.startswith(".")}
+    if "campaign.yaml" not in names and names - {"journal.jsonl"}:
+        raise InputError(f"{folder}: holds other files and is not a run folder; choose another --out")
+
+
+def _begun_with(path: Path) -> dict[str, str]:
+    said = read_document(path).data.get("made_with")
+    return {str(k): str(v) for k, v in said.items()} if isinstance(said, dict) else {}
+
+
+def _lock(journal: IO[bytes], folder: Path) -> None:
+    """Refuse a second writer, as long as the file is open; not where the system has no such locks."""
+    try:
+        import fcntl
+    except ImportError:
+        return
+    try:
+        fcntl.flock(journal, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except BlockingIOError:
+        raise InputError(f"{folder}: another `campaign run` is writing to it; wait or choose another --out") from None
+    except OSError:
+        return  # a network file system without locks
+
+
+def _read_journal(path: Path, plan: Plan, journal: IO[bytes]) -> dict[str, Record]:
+    """The finished units by key. A line torn by a crash, which can only be the last, is cut off.
+
+    Raises InputError for a line that is no unit of the plan: nothing in the file is believed unchecked.
+    """
+    expected = {
+        group.unit(i): [(case.key, name) for case in group.cases for name in case.localizers]
+        for group in plan.groups
+        for i in range(len(group.positions))
+    }
+    records: dict[str, Record] = {}
+    journal.seek(0)
+    number = good = 0
+    while line := journal.readline(_LONGEST_LINE):
+        number += 1
+        if not line.endswith(b"\n") and not journal.read(1):
+            journal.truncate(good)
+            break
+        try:
+            record = Record.model_validate_json(line)
+            answered = [(f.case, f.localizer) for f in record.findings]
+            if record.unit not in expected or not (record.error or answered == expected[record.unit]):
+                raise ValueError("not a unit of this campaign")
+        except ValueError:
+            raise InputError(f"{path}:{number}: is no finished unit of this campaign; delete the line") from None
+        records[record.unit] = record
+        good = journal.tell()
+    return records
