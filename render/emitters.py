@@ -7,9 +7,9 @@ from typing import Any
 
 import numpy as np
 
-from scene import Scene
+from render import spectral
+from scene import Pose, Scene, fundus
 from scene.beam import Beam, HardBeam, LinearBeam
-from scene.illumination import Light
 from scene.pose import Array
 from scene.power import Power
 
@@ -17,22 +17,6 @@ from scene.power import Power
 _PER_M2 = 1e6
 #: side of the beam profile's texture: bilinear lookup then follows a smoothstep to 1.5e-6 of the axial intensity
 _PROFILE = 2048
-
-
-def _spectrally_flat(total: float) -> dict[str, Any]:
-    """What every emitter radiates: the film weighs each wavelength with the light's spectrum (see `response`)."""
-    return {"type": "uniform", "value": total}
-
-
-def response(light: Light) -> dict[str, Any]:
-    """The film's response under a light [1/nm]: the light's own spectrum, whose integral is 1.
-
-    Light and sensor enter an image only as their product. With the product in the film, whose response decides which
-    wavelengths are sampled, a grey retina renders without any spectral noise.
-    """
-    curve = light.spectrum
-    wavelengths, values = (", ".join(repr(float(x)) for x in column) for column in (curve.wavelengths, curve.values))
-    return {"type": "irregular", "wavelengths": wavelengths, "values": values}
 
 
 def spotlight(mi: Any, scene: Scene) -> dict[str, Any]:
@@ -45,7 +29,7 @@ def spotlight(mi: Any, scene: Scene) -> dict[str, Any]:
     intensity = Power(value=1.0, convention=scene.power.convention).axial_intensity(beam)
     emitter = {
         "type": "spot",
-        "intensity": _spectrally_flat(intensity * _PER_M2),
+        "intensity": spectral.emission(scene, scene.illumination, intensity * _PER_M2, 0.0),
         "cutoff_angle": math.degrees(beam.half_angle),
         "beam_width": math.degrees(beam.beam_width if isinstance(beam, LinearBeam) else beam.half_angle),
         "to_world": mi.ScalarTransform4f(),
@@ -78,4 +62,15 @@ def ambient(scene: Scene) -> dict[str, Any]:
         -sideways * math.sin(light.azimuth),
         -math.cos(light.tilt),
     ]
-    return {"type": "directional", "direction": direction, "irradiance": _spectrally_flat(light.irradiance)}
+    irradiance = spectral.emission(scene, light.illumination, light.irradiance, fundus.VITREOUS_LENGTH)
+    return {"type": "directional", "direction": direction, "irradiance": irradiance}
+
+
+def through_water(scene: Scene, pose: Pose, axis: Array) -> list[float]:
+    """Values of a spotlight's spectrum behind the vitreous between tip and retina, taken along the axis.
+
+    Over a patch the way differs by a few tenths of a millimetre, at 940 nm by less than 1 % of the light.
+    """
+    hit = scene.surface.intersect(scene.eye, pose.apex, axis)
+    intensity = Power(value=1.0, convention=scene.power.convention).axial_intensity(scene.beam)
+    return spectral.emitted(scene.illumination, intensity * _PER_M2, float(np.linalg.norm(hit - pose.apex)))

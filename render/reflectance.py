@@ -14,34 +14,73 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from scene.retina import PhotoRetina, Retina, UniformRetina
+from render import spectral
+from render.fundus_maps import fundus_maps
+from render.fundus_pattern import EXTENT as MAP_EXTENT
+from render.fundus_texture import fundus_texture
+from scene.retina import Fundus, FundusSite, PhotoRetina, Retina, UniformRetina
+from scene.spectrum import Curve
 
 #: side of a texel [mm]: the photograph shows 14 mm on 1411 px
 TEXEL = 0.01
 #: half the side of the map [mm]
 EXTENT = 12.0
+#: refractive index of the vitreous in front of the retina
+VITREOUS_INDEX = 1.336
 #: centre (x, y) and radius [px] of the photograph's round field
 _FIELD = (705.0, 705.0, 680.0)
 
 
 class Reflectance:
-    """Albedo of the retina over its arc coordinates."""
+    """Reflectance of the retina over its arc coordinates, grey or spectral."""
 
     def __init__(self, retina: Retina) -> None:
         self.retina = retina
 
+    @property
+    def is_spectral_map(self) -> bool:
+        """Whether it varies with place and wavelength together, which only a JIT variant evaluates per wavelength."""
+        return isinstance(self.retina, Fundus)
+
     @functools.cached_property
     def map(self) -> NDArray[np.float32]:
-        """Albedo `[N, N]` of texels of `TEXEL` mm over +-`EXTENT` mm; rows run down (-y), columns right (+x)."""
+        """Grey albedo `[N, N]` of texels of `TEXEL` mm over +-`EXTENT` mm; rows run down (-y), columns right (+x).
+
+        Raises TypeError for a spectral retina, which has none.
+        """
         if isinstance(self.retina, UniformRetina):
             return np.full((2, 2), self.retina.albedo, np.float32)
-        return _photo_map(self.retina)
+        if isinstance(self.retina, PhotoRetina):
+            return _photo_map(self.retina)
+        raise TypeError("a spectral retina has no grey albedo")
 
-    def texture(self, mi: Any) -> dict[str, Any]:
+    def bsdf(self, mi: Any, dr: Any, band: Curve | None = None) -> dict[str, Any]:
+        """The Mitsuba BSDF: Lambertian, under a dielectric coat where the retina has a glint.
+
+        `band`: for the scalar variant, the weight over which a spectral map is averaged.
+        """
+        texture = self._texture(mi, dr, band)
+        glint = self.retina.glint if isinstance(self.retina, Fundus) else None
+        if glint is None:
+            return {"type": "diffuse", "reflectance": texture}
+        coat = {"int_ior": glint.index, "ext_ior": VITREOUS_INDEX, "alpha": glint.roughness, "distribution": "ggx"}
+        return {"type": "roughplastic", "diffuse_reflectance": texture, **coat}
+
+    def _texture(self, mi: Any, dr: Any, band: Curve | None) -> Any:
         """The Mitsuba texture, over the texture coordinates that `texture_coordinates` gives."""
         if isinstance(self.retina, UniformRetina):
             return {"type": "uniform", "value": self.retina.albedo}
-        bitmap = mi.Bitmap(self.map[..., None])
+        if isinstance(self.retina, FundusSite):
+            return spectral.reflectance_spectrum(self.retina.site)
+        if isinstance(self.retina, Fundus):
+            maps = fundus_maps(self.retina)
+            if band is None:
+                return fundus_texture(mi, dr, maps, self.retina, EXTENT)
+            border = round((EXTENT - MAP_EXTENT) / TEXEL)
+            grey = np.pad(maps.band(band, self.retina, TEXEL), border, mode="edge")
+        else:
+            grey = self.map
+        bitmap = mi.Bitmap(np.asarray(grey, np.float32)[..., None])
         return {"type": "bitmap", "bitmap": bitmap, "raw": True, "filter_type": "bilinear", "wrap_mode": "clamp"}
 
     @staticmethod

@@ -13,7 +13,7 @@ from scene.spotlights import Shaft
 
 
 def shaft_shapes(mi: Any, shaft: Shaft) -> dict[str, Any]:
-    """An open cylinder and the cap that faces the retina, to be placed by `place`."""
+    """An open cylinder and the cap that faces the retina, to be placed by `placed`."""
     bsdf = {"type": "twosided", "bsdf": {"type": "diffuse", "reflectance": {"type": "uniform", "value": shaft.albedo}}}
     return {
         "shaft": {"type": "cylinder", "bsdf": bsdf},
@@ -21,14 +21,16 @@ def shaft_shapes(mi: Any, shaft: Shaft) -> dict[str, Any]:
     }
 
 
-def place(mi: Any, parameters: Any, shaft: Shaft, pose: Pose) -> None:
-    """Move the shapes of `shaft_shapes` in a scene's traversed `parameters` to a pose."""
+def placed(mi: Any, shaft: Shaft, pose: Pose) -> dict[str, Any]:
+    """Parameters that move the shapes of `shaft_shapes` to a pose."""
     end, far = _ends(shaft, pose)
     radius = shaft.diameter / 2.0
     up = np.eye(3)[np.argmin(np.abs(pose.axis))]
     frame = mi.ScalarTransform4f().look_at(origin=end.tolist(), target=far.tolist(), up=up.tolist())
-    parameters["shaft.to_world"] = frame @ mi.ScalarTransform4f().scale([radius, radius, shaft.length])
-    parameters["shaft_end.to_world"] = frame @ mi.ScalarTransform4f().scale([radius, radius, 1.0])
+    return {
+        "shaft.to_world": frame @ mi.ScalarTransform4f().scale([radius, radius, shaft.length]),
+        "shaft_end.to_world": frame @ mi.ScalarTransform4f().scale([radius, radius, 1.0]),
+    }
 
 
 def shaft_crop(scene: Scene, shaft: Shaft, pose: Pose) -> Crop:

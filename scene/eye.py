@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Annotated
+
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from pydantic import Field
@@ -38,3 +40,13 @@ class Eye(Model):
         rho2 = np.square(np.asarray(x, float)) + np.square(np.asarray(y, float))
         inside = np.where(rho2 <= self.radius**2, self.radius**2 - rho2, np.nan)
         return self.radius - np.sqrt(inside)
+
+
+class Globe(Model):
+    """The whole eyeball, closed but for a pupil that swallows light: adds what its walls reflect to each other.
+
+    Light bounces up to `bounces` times between walls that reflect like the retina's perifovea (or its grey).
+    """
+
+    pupil: Annotated[Length, Field(ge=0.0, le=16.0)] = 8.0  #: diameter [mm]
+    bounces: int = Field(8, ge=1, le=64)

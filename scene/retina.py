@@ -42,6 +42,7 @@ class FundusSite(Model):
 
     kind: Literal["site"] = "site"
     site: Literal["nasal", "perifovea", "fovea"] = "perifovea"
+    water: bool = True  #: whether the vitreous absorbs like water, to and from the retina
 
 
 class Glint(Model):
@@ -69,6 +70,7 @@ class Fundus(Model):
     artery_saturation: float = Field(0.97, ge=0.0, le=1.0)
     vein_saturation: float = Field(0.60, ge=0.0, le=1.0)
     detail: float = Field(0.06, ge=0.0, le=0.3)
+    water: bool = True  #: whether the vitreous absorbs like water, to and from the retina
     glint: Glint | None = None
 
 

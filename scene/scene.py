@@ -12,7 +12,7 @@ from pydantic import model_validator
 from scene.beam import Beam, CyclesBeam
 from scene.camera import Camera
 from scene.document import Document, find_document, merge, read_document
-from scene.eye import Eye
+from scene.eye import Eye, Globe
 from scene.illumination import Ambient, FlatBand, Illumination
 from scene.model import Model
 from scene.pose import Pose
@@ -37,6 +37,7 @@ class Scene(Model):
     surface: AnySurface = Surface()
     retina: Retina = PhotoRetina()
     sensor: Sensor = Srgb8()
+    interreflection: Globe | None = None
 
     @model_validator(mode="after")
     def _fits(self) -> Scene:

@@ -194,7 +194,7 @@ def test_sum_of_tiles_times_power_is_one_render_at_that_power():
         {
             "type": "scene",
             "integrator": {"type": "path", "max_depth": 2},
-            "retina": renderer._retina,
+            "retina": renderer._lit.retina,
             "sensor": {
                 "type": "perspective",
                 "fov": math.degrees(scene.camera.full_fov),

@@ -1,0 +1,57 @@
+"""The rest of the eyeball, for light that the retina reflects more than once."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+from render import spectral
+from scene import Eye, Scene
+from scene.eye import Globe
+from scene.retina import Fundus, FundusSite, PhotoRetina
+
+#: the wall lies this far outside the retina's mesh, relative to the radius, so that the mesh is what light meets
+_BEHIND = 2e-4
+
+
+def globe_shapes(mi: Any, scene: Scene, globe: Globe) -> dict[str, Any]:
+    """The wall as a sphere seen from inside, and the pupil as a black disc in front of it."""
+    eye = scene.eye
+    wall = {
+        "type": "sphere",
+        "center": eye.centre.tolist(),
+        "radius": eye.radius * (1.0 + _BEHIND),
+        "flip_normals": True,
+        "bsdf": {"type": "diffuse", "reflectance": _wall(scene)},
+    }
+    if globe.pupil == 0.0:
+        return {"wall": wall}
+    black = {"type": "diffuse", "reflectance": {"type": "uniform", "value": 0.0}}
+    return {"wall": wall, "pupil": {"type": "disk", "to_world": _pupil_to_world(mi, eye, globe), "bsdf": black}}
+
+
+def _pupil_to_world(mi: Any, eye: Eye, globe: Globe) -> Any:
+    """Where the pupil's disc stands: as high as a sphere's cap of its width, facing the retina."""
+    half = min(globe.pupil / 2.0, 0.95 * eye.radius)
+    height = eye.radius + math.sqrt(eye.radius**2 - half**2)
+    transform = mi.ScalarTransform4f().translate([0.0, 0.0, height])
+    return (
+        transform
+        @ mi.ScalarTransform4f().rotate([1.0, 0.0, 0.0], 180.0)
+        @ mi.ScalarTransform4f().scale([half, half, 1.0])
+    )
+
+
+def near_plane(scene: Scene) -> float:
+    """Distance from the camera [mm] behind which it sees: inside the eye, so that the wall above does not hide it."""
+    eye, camera = scene.eye, scene.camera
+    reach = math.sqrt(2.0) * camera.sensor_width / 2.0 / camera.focal_length * (camera.height - eye.radius)
+    top = eye.radius + math.sqrt(max(eye.radius**2 - reach**2, 0.0))
+    return float(camera.height - 0.95 * top)
+
+
+def _wall(scene: Scene) -> dict[str, Any]:
+    retina = scene.retina
+    if isinstance(retina, (Fundus, FundusSite)):
+        return spectral.reflectance_spectrum(retina.site if isinstance(retina, FundusSite) else "perifovea")
+    return {"type": "uniform", "value": retina.mean if isinstance(retina, PhotoRetina) else retina.albedo}

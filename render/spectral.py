@@ -1,0 +1,97 @@
+"""How a film weighs wavelengths: the sensor's response times the light's spectrum, and the vitreous on the way out.
+
+Light and sensor enter an image only as their product. With the product in the film, whose response decides which
+wavelengths are sampled, a grey retina renders without any spectral noise.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from scene import Scene, fundus
+from scene.emva import Emva
+from scene.illumination import Light
+from scene.retina import Fundus, FundusSite
+from scene.spectrum import Curve
+
+#: up to this many points a spectrum is given to Mitsuba as it is
+_FEW_POINTS = 256
+_WATER = Curve(np.arange(300.0, 1101.0), np.asarray(fundus.water_transmission(np.arange(300.0, 1101.0))))
+
+
+@dataclass(frozen=True)
+class Channel:
+    """One film channel: its name, the sensor's response alone, and the film's curve with the light in it."""
+
+    name: str
+    response: Curve
+    film: Curve
+
+
+def unit(scene: Scene) -> str:
+    """Unit of what the film integrates: radiance, or weighted with a camera's responsivity."""
+    return "A m-2 sr-1" if isinstance(scene.sensor, Emva) else "W m-2 sr-1"
+
+
+def has_water(scene: Scene) -> bool:
+    """Whether the vitreous absorbs: in a living eye it does."""
+    return isinstance(scene.retina, (Fundus, FundusSite)) and scene.retina.water
+
+
+def channels(scene: Scene, light: Light, responses: dict[str, Curve] | None = None) -> tuple[Channel, ...]:
+    """The channels of the scene's sensor (or of `responses`) under a light, in the order of their names' table.
+
+    `srgb8` and `linear` have one with response 1: radiance integrated over wavelength.
+    """
+    spectrum = light.spectrum
+    wide = Curve(np.array([300.0, 1100.0]), np.ones(2))
+    if responses is None and isinstance(scene.sensor, Emva):
+        responses = scene.sensor.responses
+    found = []
+    for name, response in (responses or {"radiance": wide}).items():
+        seen = spectrum if responses is None else spectrum.times(response)
+        found.append(Channel(name, response, seen.times(_WATER) if has_water(scene) else seen))
+    return tuple(found)
+
+
+def emission(scene: Scene, light: Light, total: float, water_mm: float) -> dict[str, Any]:
+    """What an emitter radiates, the film having the light's spectrum: the same at all wavelengths.
+
+    In a living eye `water_mm` of vitreous between the light and the retina absorb some.
+    """
+    if not has_water(scene):
+        return {"type": "uniform", "value": total}
+    values = _written(emitted(light, total, water_mm))
+    low, high = light.spectrum.low, light.spectrum.high
+    return {"type": "regular", "wavelength_min": low, "wavelength_max": high, "values": values}
+
+
+def emitted(light: Light, total: float, water_mm: float) -> list[float]:
+    """Values of an emitter's regular spectrum behind `water_mm` of vitreous."""
+    x = np.linspace(light.spectrum.low, light.spectrum.high, 129)
+    return [float(v) for v in total * fundus.water_transmission(x, water_mm)]
+
+
+def film_spectrum(curve: Curve) -> dict[str, Any]:
+    """A film's response for Mitsuba: the curve itself, or with many points an even grid of the same integral."""
+    if len(curve.wavelengths) <= _FEW_POINTS:
+        return {"type": "irregular", "wavelengths": _written(curve.wavelengths), "values": _written(curve.values)}
+    points = int(np.clip(np.ceil((curve.high - curve.low) / 0.5) + 1, 257, 1401))
+    values = curve(np.linspace(curve.low, curve.high, points))
+    total = float(np.trapezoid(values, dx=(curve.high - curve.low) / (points - 1)))
+    if total > 0.0:
+        values = values * (curve.integral() / total)
+    return {"type": "regular", "wavelength_min": curve.low, "wavelength_max": curve.high, "values": _written(values)}
+
+
+def reflectance_spectrum(site: str) -> dict[str, Any]:
+    """A site of the fundus as a regular spectrum at whole nanometres."""
+    values = fundus.reflectance(np.arange(300.0, 1101.0), fundus.SITES[site])
+    return {"type": "regular", "wavelength_min": 300.0, "wavelength_max": 1100.0, "values": _written(values)}
+
+
+def _written(values: Any) -> str:
+    return ", ".join(repr(float(v)) for v in values)
