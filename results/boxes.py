@@ -15,6 +15,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 from numpy.typing import ArrayLike
+from pandas.api.types import is_numeric_dtype
 
 from results.rows import METRICS, Rows
 
@@ -82,6 +83,6 @@ def encode_boxes(boxes: pd.DataFrame) -> bytes:
 
 def read_boxes(path: Path, rows: Rows) -> pd.DataFrame:
     """The boxes of `rows` that `encode_boxes` wrote to a file."""
-    kinds: dict[str, Any] = {name: str for name in rows.group if rows.frame[name].dtype == object}
+    kinds: dict[str, Any] = {name: str for name in rows.group if not is_numeric_dtype(rows.frame[name])}
     boxes = pd.read_csv(path, dtype=kinds, keep_default_na=False, na_values={name: [""] for name in STATISTICS[:-1]})
     return boxes.assign(outliers=[json.loads(row) for row in boxes["outliers"]])

@@ -11,8 +11,8 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.ticker import MaxNLocator
 
-from results.published import published_value
-from results.style import COLOURS, frame, panel_title, plain_numbers
+from results.published import published_means
+from results.style import COLOURS, frame, panel_title, paper_label, plain_numbers
 from results.variants import ordered
 
 #: per row of panels: what it shows, its unit, the signed parts, the overall error, its published source
@@ -21,6 +21,7 @@ _PANELS = (
     ("Rotation", "deg", {"about Y": "error_rot_y_deg", "about Z": "error_rot_z_deg"}, "rotation_error_deg"),
 )
 _MOST_RIGS = 4
+_DASHED = (0, (5, 3))
 _LOG_ABOVE = 30.0  #: an error this many times the 75 % quantile would press all others flat
 
 
@@ -34,21 +35,25 @@ def pose_figure(rows: pd.DataFrame, title: str, caption: str, source: str | None
     frame(figure, title, caption)
     grid = figure.subplots(len(_PANELS), len(rigs), sharex=True, sharey="row", squeeze=False)
     for row, (what, unit, parts, overall) in enumerate(_PANELS):
+        most = float(rows.loc[rows["status"] == "ok", overall].max())
+        published = published_means(source, str(rows["trajectory"].iloc[0]), rigs, overall, most)
         for column, rig in enumerate(rigs):
             axes = grid[row, column]
             panel_title(axes, row * len(rigs) + column, what, rig)
-            _draw(axes, rows[rows["spotlights"] == rig], parts, overall, source, rig)
+            _draw(axes, rows[rows["spotlights"] == rig], parts, overall)
+            if rig in published:
+                axes.axhline(published[rig], color=COLOURS["paper"], linewidth=1.2, linestyle=_DASHED, zorder=2)
         linear_to = _scale(grid[row, 0], rows, [*parts.values(), overall])
         beyond = f"\nlogarithmic beyond ±{linear_to:g}" if linear_to else ""
         grid[row, 0].set_ylabel(f"{what.lower()} error [{unit}]{beyond}")
-        _legend(grid[row, -1], [*parts, "overall"], source)
+        _legend(grid[row, -1], [*parts, "overall"], source and paper_label(source, bool(published)))
     figure.align_ylabels(grid[:, 0])
     for axes in grid[-1]:
         axes.set_xlabel("pose along the trajectory")
     return figure
 
 
-def _draw(axes: Axes, rows: pd.DataFrame, parts: dict[str, str], overall: str, source: str | None, rig: str) -> None:
+def _draw(axes: Axes, rows: pd.DataFrame, parts: dict[str, str], overall: str) -> None:
     rows = rows.sort_values("pose")
     located = rows["status"] == "ok"
     axes.axhline(0.0, color="#9AA1AC", linewidth=0.8, zorder=1)
@@ -64,9 +69,6 @@ def _draw(axes: Axes, rows: pd.DataFrame, parts: dict[str, str], overall: str, s
             failed, np.full(len(failed), 0.02), "x", color=COLOURS["failed"], transform=strip, markersize=5, zorder=4
         )
         axes.set_title(f"× {len(failed)} of {len(rows)} failed", loc="right", color=COLOURS["failed"], fontsize=8.0)
-    known = published_value(source, str(rows["trajectory"].iloc[0]), rig, "AE", overall) if source else None
-    if known is not None:
-        axes.axhline(known, color=COLOURS["paper"], linewidth=1.2, linestyle=(0, (5, 3)), zorder=2)
     axes.xaxis.set_major_locator(MaxNLocator(integer=True, nbins=8, steps=[1, 2, 5, 10]))
     axes.margins(x=0.015)
 
@@ -89,9 +91,9 @@ def _scale(axes: Axes, rows: pd.DataFrame, columns: list[str]) -> float | None:
     return linear_to
 
 
-def _legend(axes: Axes, names: list[str], source: str | None) -> None:
+def _legend(axes: Axes, names: list[str], paper: str | None) -> None:
     handles = [Line2D([], [], color=COLOURS[name], linewidth=1.8 if name == "overall" else 1.2) for name in names]
-    if source:
-        handles.append(Line2D([], [], color=COLOURS["paper"], linewidth=1.2, linestyle=(0, (5, 3))))
-        names = [*names, f"AE in the paper's {source}"]
+    if paper:
+        handles.append(Line2D([], [], color=COLOURS["paper"], linewidth=1.2, linestyle=_DASHED))
+        names = [*names, paper]
     axes.legend(handles, names, loc="upper left", bbox_to_anchor=(1.01, 1.0), handlelength=1.6)

@@ -11,12 +11,13 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
-from results.published import REFERENCE_POWER_W, published_value
-from results.style import COLOURS, frame, panel_title, plain_numbers
+from results.published import REFERENCE_POWER_W, published_means
+from results.style import COLOURS, frame, panel_title, paper_label, plain_numbers
 from results.variants import ordered
 
 _PANELS = (("Position", "mm", "position_error_mm"), ("Rotation", "deg", "rotation_error_deg"))
 _MOST_RIGS = 4
+_PAPER: dict[str, Any] = {"markersize": 6.0, "markerfacecolor": "none", "color": COLOURS["paper"]}
 _LOG_ABOVE = 12.0  #: largest value over the largest quartile, above which a linear axis shows outliers only
 
 
@@ -31,24 +32,30 @@ def power_figure(boxes: pd.DataFrame, title: str, caption: str, source: str | No
     figure = Figure(figsize=(min(1.6 + wide * max(len(rigs), 1.3), 30.0), 6.8), layout="constrained")
     frame(figure, title, caption)
     grid = figure.subplots(len(_PANELS), len(rigs), sharex=True, sharey="row", squeeze=False)
+    pad = 15.0 if boxes["failed"].any() else 7.0  # the numbers of failed frames stand below the titles
+    paper = source if REFERENCE_POWER_W in powers else None
     for row, (what, unit, metric) in enumerate(_PANELS):
         here = boxes[boxes["metric"] == metric]
-        _scale(grid[row, 0], here)
+        published = published_means(paper, str(boxes["trajectory"].iloc[0]), rigs, metric, float(here["max"].max()))
+        _scale(grid[row, 0], here, max(published.values(), default=0.0))
         for column, rig in enumerate(rigs):
             axes = grid[row, column]
-            panel_title(axes, row * len(rigs) + column, what, rig)
-            _draw(axes, here[here["spotlights"] == rig], powers, metric, source)
+            panel_title(axes, row * len(rigs) + column, what, rig, pad)
+            _draw(axes, here[here["spotlights"] == rig], powers)
+            if rig in published:
+                axes.plot(powers.index(REFERENCE_POWER_W), published[rig], "D", **_PAPER, zorder=5)
         grid[row, 0].set_ylabel(f"{what.lower()} error [{unit}]")
+        if row == 0:
+            _legend(grid[0, -1], paper and paper_label(paper, bool(published)))
     figure.align_ylabels(grid[:, 0])
     for axes in grid[-1]:
         axes.set_xticks(range(len(powers)), [f"{power:g}" for power in powers], rotation=0 if len(powers) <= 9 else 90)
         axes.set_xlim(-0.6, len(powers) - 0.4)
         axes.set_xlabel("light power [W]")
-    _legend(grid[0, -1], source)
     return figure
 
 
-def _draw(axes: Axes, boxes: pd.DataFrame, powers: list[float], metric: str, source: str | None) -> None:
+def _draw(axes: Axes, boxes: pd.DataFrame, powers: list[float]) -> None:
     places = {power: i for i, power in enumerate(powers)}
     drawn = boxes[boxes["n"] > 0]
     rig = str(boxes["spotlights"].iloc[0])
@@ -79,17 +86,6 @@ def _draw(axes: Axes, boxes: pd.DataFrame, powers: list[float], metric: str, sou
             fontsize=7.5,
             color=COLOURS["failed"],
         )
-    known = published_value(source, str(boxes["trajectory"].iloc[0]), rig, "AE", metric) if source else None
-    if known is not None and REFERENCE_POWER_W in places:
-        axes.plot(
-            places[REFERENCE_POWER_W],
-            known,
-            "D",
-            markersize=6,
-            markerfacecolor="none",
-            color=COLOURS["paper"],
-            zorder=5,
-        )
 
 
 def _bxp(box: dict[Any, Any]) -> dict[str, Any]:
@@ -98,20 +94,18 @@ def _bxp(box: dict[Any, Any]) -> dict[str, Any]:
     return {**{word: box[name] for word, name in words.items()}, "fliers": np.asarray(box["outliers"], float)}
 
 
-def _scale(axes: Axes, boxes: pd.DataFrame) -> None:
+def _scale(axes: Axes, boxes: pd.DataFrame, published: float) -> None:
     """Logarithmic where the outliers lie far beyond the boxes, else linear from zero. Panels share it."""
     drawn = boxes[boxes["n"] > 0]
-    if drawn.empty:
-        return
-    least = drawn.loc[drawn["min"] > 0.0, "min"].min()
-    if drawn["max"].max() > _LOG_ABOVE * drawn["q3"].max() and least > 0.0 and (drawn["whisker_low"] > 0.0).all():
+    most = max(drawn["max"].max(), published) if len(drawn) else published
+    if len(drawn) and most > _LOG_ABOVE * drawn["q3"].max() and (drawn["min"] > 0.0).all():
         axes.set_yscale("log")
         plain_numbers(axes.yaxis)
     else:
-        axes.set_ylim(0.0, 1.05 * drawn["max"].max() or 1.0)
+        axes.set_ylim(0.0, 1.05 * most or 1.0)
 
 
-def _legend(axes: Axes, source: str | None) -> None:
+def _legend(axes: Axes, paper: str | None) -> None:
     grey = "#4B5563"
     entries: list[tuple[Any, str]] = [
         (Patch(facecolor="#4B556333", edgecolor=grey), "quartiles"),
@@ -120,8 +114,7 @@ def _legend(axes: Axes, source: str | None) -> None:
         (Line2D([], [], color=grey, linewidth=1.0, marker="|"), "within 1.5 IQR"),
         (Line2D([], [], color="none", marker="x", markeredgecolor=grey, markersize=4), "outlier"),
     ]
-    if source:
-        marker = Line2D([], [], color="none", marker="D", markerfacecolor="none", markeredgecolor=COLOURS["paper"])
-        entries.append((marker, f"AE in the paper's\n{source}"))
+    if paper:
+        entries.append((Line2D([], [], linestyle="none", marker="D", **_PAPER), paper))
     handles, names = zip(*entries, strict=True)
     axes.legend(handles, names, loc="upper left", bbox_to_anchor=(1.01, 1.0), handlelength=1.6)

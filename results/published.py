@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import csv
 import functools
+from collections.abc import Iterable
 from dataclasses import dataclass
 from importlib import resources
 
@@ -78,3 +79,18 @@ def published_value(source: str, trajectory: str, spotlights: str, quantity: str
         if (row.source, row.trajectory, row.spotlights, row.quantity, row.metric) == wanted:
             return row.value
     return None
+
+
+def published_means(
+    source: str | None, trajectory: str, rigs: Iterable[str], metric: str, largest: float
+) -> dict[str, float]:
+    """The published AE by spotlight rig, where the paper has one and it lies among our errors, up to the `largest`.
+
+    More than three times the largest, it would only press them flat in a figure.
+    """
+    found: dict[str, float] = {}
+    for rig in rigs if source else ():
+        known = published_value(str(source), trajectory, rig, "AE", metric)
+        if known is not None and not known > 3.0 * largest:  # true for NaN: every frame failed
+            found[rig] = known
+    return found

@@ -68,7 +68,8 @@ def _facts(run: Run) -> list[tuple[str, str]]:
     ]
     for name in ("localizer", "trajectory", "spotlights", "surface", "illumination", "sensor", "resolution_px"):
         values = [str(value) for value in ordered(frame[name])]
-        facts.append((name.removesuffix("_px"), ", ".join(values[:12]) + (" ..." if len(values) > 12 else "")))
+        title, unit = ("resolution", " px") if name == "resolution_px" else (name, "")
+        facts.append((title, ", ".join(values[:12]) + (" ..." if len(values) > 12 else "") + unit))
     return facts
 
 

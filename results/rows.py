@@ -12,6 +12,7 @@ import pandas as pd
 import pyarrow as pa
 import pyarrow.csv
 import pyarrow.parquet
+from pandas.api.types import is_numeric_dtype
 
 from scene import InputError
 
@@ -82,7 +83,7 @@ def read_rows(path: Path, swept: Iterable[str] = ()) -> Rows:
     is too large, lacks a column, has another one, or holds values of the wrong type or out of bounds.
     """
     keys = tuple(swept)
-    table = read_table(path, text=(*_TEXT, *keys))
+    table = read_table(path, _MAX_ROWS, text=(*_TEXT, *keys))
     missing = [name for name in COLUMNS if name not in table.column_names]
     if missing:
         raise InputError(f"{path}: no column {', '.join(missing)}; a run's rows have all of {', '.join(COLUMNS)}")
@@ -105,8 +106,8 @@ def read_rows(path: Path, swept: Iterable[str] = ()) -> Rows:
     return rows
 
 
-def read_table(path: Path, text: Sequence[str] = (), max_rows: int = _MAX_ROWS) -> pa.Table:
-    """A parquet or CSV file as a table of bounded size; `text` are the columns a CSV file holds as text.
+def read_table(path: Path, max_rows: int, text: Sequence[str] = ()) -> pa.Table:
+    """A parquet or CSV file as a table of at most `max_rows`; `text` are the columns a CSV file holds as text.
 
     Raises InputError.
     """
@@ -185,7 +186,7 @@ def _check(rows: Rows, path: Path) -> None:
     frame = rows.frame
     _require(frame["status"].isin(("ok", "failed")), "status must be ok or failed", path)
     for name in rows.group:
-        if frame[name].dtype == object:
+        if not is_numeric_dtype(frame[name]):
             _check_names(frame[name].unique(), name, path)
         else:
             _require(np.isfinite(frame[name]), f"{name} must be a finite number", path)

@@ -64,7 +64,7 @@ def _swept(document: Document) -> list[str]:
 
 def _read_theory(path: Path) -> pd.DataFrame:
     """Cone-sphere curve against ellipse by half angle: columns `THEORY_COLUMNS`. Raises InputError."""
-    table = read_table(path, max_rows=10_000)
+    table = read_table(path, 10_000)
     missing = [name for name in THEORY_COLUMNS if name not in table.column_names]
     if missing:
         raise InputError(f"{path}: no column {', '.join(missing)}; Table I needs {', '.join(THEORY_COLUMNS)}")

@@ -86,8 +86,9 @@ def _line(row: Sequence[str], widths: Sequence[int], flush: Sequence[bool]) -> s
     return "  ".join(cells).rstrip()
 
 
+_MARKUP = str.maketrans({**{sign: f"\\{sign}" for sign in "\\`*_[]#"}, **{sign: f"&#{ord(sign)};" for sign in "&<>|"}})
+
+
 def _escaped(text: str) -> str:
     """A run may come from a stranger: nothing in it becomes markup."""
-    for sign in "\\`*_[]<>|#":
-        text = text.replace(sign, f"&#{ord(sign)};" if sign in "<>|" else f"\\{sign}")
-    return text
+    return text.translate(_MARKUP)

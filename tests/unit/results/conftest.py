@@ -1,11 +1,11 @@
 """A run folder without a renderer: rows with known errors, a resolved campaign, and Table I."""
 
 import itertools
-import shutil
 from pathlib import Path
 
 import numpy as np
 import pandas as pd
+import pytest
 from ruamel.yaml import YAML
 
 from results.rows import COLUMNS
@@ -99,5 +99,16 @@ def write_run(folder: Path, frame=None, *, document=None, theory=False, kind="pa
     return folder
 
 
-def copy_run(source: Path, target: Path) -> Path:
-    return Path(shutil.copytree(source, target))
+@pytest.fixture(scope="session")
+def make_campaign():
+    return campaign
+
+
+@pytest.fixture(scope="session")
+def make_rows():
+    return rows
+
+
+@pytest.fixture(scope="session")
+def make_run():
+    return write_run
