@@ -3,9 +3,11 @@
 It departs from the paper's text in three ways, all kept: the ellipse lies in the plane that touches the sphere above
 the middle of the outline's bounding box, not in the outline's own plane; that middle, already a place on the retina,
 is taken through Eqs. 1-7 a second time; and the outline is kept in an array of integers, so its points are cut to
-whole pixels after the reconstruction and again after the rotation into the plane. The last scatters the positions by
-10-20 um at 5000 px, in inverse proportion to the resolution, and makes the published maximum errors: with it the
-authors' released estimates are followed pose by pose, without it they are not.
+whole pixels after the reconstruction and again after the rotation into the plane.
+
+The whole pixels scatter the positions by about 20 um at 5000 px, in inverse proportion to the resolution, and make
+the published maximum and rotation errors. Over 43 of the estimates the authors released (mean error 32 um) this chain
+is 6 um off pose by pose on noise-free frames, 9 um without the second pass, 24 um without the whole pixels.
 """
 
 from __future__ import annotations

@@ -11,7 +11,7 @@ from localize.outcome import CUT_BY_BORDER, FEWER_PATCHES, NOTHING_FOUND, Locali
 Mask = NDArray[np.uint8]
 Contour = NDArray[np.int32]
 
-#: Gaussian and median kernels before Otsu [px]; the paper (section 3.1) names the filters but not their sizes
+#: Gaussian and median kernels before Otsu [px]; the paper names the filters but not their sizes
 GAUSSIAN = 9
 MEDIAN = 5
 #: the authors' code: median kernel [px], and the grey value of 255 that a patch exceeds
@@ -20,7 +20,7 @@ CODED_THRESHOLD = 50
 #: an outline of fewer points carries no ellipse (the authors' rule)
 _FEWEST_POINTS = 6
 #: a blob this much smaller than the largest is texture, not a spotlight: all cones are equal and share one apex
-_SMALLEST_SHARE = 0.02
+_SMALLEST_SHARE = 0.1
 
 
 def otsu_mask(grey: NDArray[np.uint8]) -> Mask:

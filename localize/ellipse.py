@@ -34,7 +34,9 @@ def fit_ellipse(points: Array) -> Ellipse | None:
         return None
     x, y = ((points - middle) / scale).T
     one = np.ones(len(points))
-    p = np.linalg.lstsq(np.column_stack([x * x, y * y, x * y, x, y]), one, rcond=None)[0]
+    p, _, rank, _ = np.linalg.lstsq(np.column_stack([x * x, y * y, x * y, x, y]), one, rcond=None)
+    if rank < 5:
+        return None
     form = np.array([[p[0], p[2] / 2.0], [p[2] / 2.0, p[1]]])
     if not np.linalg.det(form) > 1e-12 * np.sum(form**2):
         return None
