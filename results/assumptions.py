@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass
 from typing import Any
@@ -14,6 +15,7 @@ from scene.power import Power
 from scene.quantity import FROM_FILE, format_quantity
 
 _NOT_STATED = "not stated"
+_BEAM = TypeAdapter[Any](Beam)
 #: threshold and answer to the two-fold ambiguity, by localizer
 _LOCALIZERS = {
     "paper": ("Otsu after Gaussian and median", "candidate that fits the RCM"),
@@ -78,9 +80,7 @@ def scene_of(scene: Mapping[str, Any], setting: Mapping[str, Any]) -> dict[str, 
     """
     result = {key: value for key, value in scene.items() if key != "preset"}
     preset = setting.get("scene", setting.get("scene.preset", scene.get("preset")))
-    file = shipped("scene", "presets").get(str(preset))
-    if file is not None:
-        result = merge(read_document(file).data, result)
+    result = merge(_preset(str(preset)), result)
     for column, value in setting.items():
         path = column.removeprefix("scene.").split(".")
         if "." not in column or path[0] not in result or path == ["preset"]:
@@ -90,6 +90,12 @@ def scene_of(scene: Mapping[str, Any], setting: Mapping[str, Any]) -> dict[str, 
             nested = {key: nested}
         result = merge(result, nested)
     return result
+
+
+@functools.lru_cache(maxsize=64)
+def _preset(name: str) -> dict[str, Any]:
+    file = shipped("scene", "presets").get(name)
+    return read_document(file).data if file is not None else {}
 
 
 @dataclass(frozen=True)
@@ -124,7 +130,7 @@ def both_conventions(scene: Mapping[str, Any], power_w: float) -> Watts | None:
 
 def _beam(scene: Mapping[str, Any]) -> Beam | None:
     try:
-        beam: Beam = TypeAdapter[Any](Beam).validate_python(scene.get("beam"), context={FROM_FILE: True})
+        beam: Beam = _BEAM.validate_python(scene.get("beam"), context={FROM_FILE: True})
     except ValidationError:
         return None
     return beam

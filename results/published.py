@@ -26,7 +26,8 @@ BOTH = "box and helix"
 NOTES = {
     "Table I": (
         "Published: the in-plane difference |y - y'| at equal x, for a vertical axis, apex 5 mm above the pole and "
-        "x0 = 4.45 mm. The distance between the curves in 3D is larger and stands beside it."
+        "x0 = 4.45 mm. The distance between the curves in 3D is larger and stands beside it, there and at its greatest "
+        "over the volume of interest with the axis through the RCM."
     ),
     "Table IV": (
         "AE is the mean and ME the maximum over the poses that were localized. The abstract's means over both "

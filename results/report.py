@@ -63,6 +63,7 @@ def _facts(run: Run) -> list[tuple[str, str]]:
     powers = [f"{power:g}" for power in sorted(frame["power_w"].unique())]
     facts += [
         ("rows", f"{len(frame)} (one per frame and localizer)"),
+        ("poses", str(frame["pose"].nunique())),
         ("failed", f"{failed} ({100.0 * failed / len(frame):.3g} %)"),
         ("power", f"{', '.join(powers[:20])}{' ...' if len(powers) > 20 else ''} W"),
     ]

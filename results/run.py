@@ -14,6 +14,8 @@ from scene import InputError
 from scene.document import Document, read_document
 
 THEORY_COLUMNS = ("half_angle_deg", "in_plane_um", "distance_3d_um")
+#: the greatest distance over the whole volume, which a run may give too
+VOLUME_COLUMN = "volume_distance_3d_um"
 
 
 @dataclass(frozen=True)
@@ -63,12 +65,13 @@ def _swept(document: Document) -> list[str]:
 
 
 def _read_theory(path: Path) -> pd.DataFrame:
-    """Cone-sphere curve against ellipse by half angle: columns `THEORY_COLUMNS`. Raises InputError."""
+    """Cone-sphere curve against ellipse by half angle: `THEORY_COLUMNS` and `VOLUME_COLUMN`. Raises InputError."""
     table = read_table(path, 10_000)
     missing = [name for name in THEORY_COLUMNS if name not in table.column_names]
     if missing:
         raise InputError(f"{path}: no column {', '.join(missing)}; Table I needs {', '.join(THEORY_COLUMNS)}")
-    frame = pd.DataFrame({name: number_column(table, name, path) for name in THEORY_COLUMNS})
+    names = [name for name in (*THEORY_COLUMNS, VOLUME_COLUMN) if name in table.column_names]
+    frame = pd.DataFrame({name: number_column(table, name, path) for name in names})
     if frame.empty or not np.isfinite(frame.to_numpy()).all() or (frame < 0.0).to_numpy().any():
         raise InputError(f"{path}: every value must be a non-negative number, and there must be a row")
     return frame

@@ -20,7 +20,7 @@ from results.published import (
     published_theory,
     published_value,
 )
-from results.run import Run
+from results.run import VOLUME_COLUMN, Run
 from results.table import Block, Table, number
 from results.variants import Variant, by_axes, split
 
@@ -86,20 +86,34 @@ def _collect(
 def _table_1(run: Run) -> Table | None:
     if run.theory is None:
         return None
-    assumed = theory_assumptions()
-    names = ("ours_um", "published_um", "difference_um", "ratio", "distance_3d_um")
+    sets = theory_assumptions()
     records: _Records = []
-    for angle, ours, distance in run.theory.sort_values("half_angle_deg").itertuples(index=False, name=None):
+    lines: list[tuple[str, ...]] = []
+    for row in run.theory.sort_values("half_angle_deg").to_dict("records"):
+        angle, ours = row["half_angle_deg"], row["in_plane_um"]
         known = next((v for a, v in published_theory().items() if math.isclose(a, angle)), math.nan)
-        values = (ours, known, ours - known, ours / known, distance)
-        records.append({"half_angle_deg": angle, **dict(zip(names, values, strict=True)), **assumed.columns()})
-    lines = [
-        (f"{r['half_angle_deg']:g}", *(f"{r[k]:.2f}" if math.isfinite(r[k]) else "–" for k in names)) for r in records
-    ]
-    header = ("half angle [deg]", "in plane [um]", "paper", "difference", "ratio", "in 3D [um]")
-    block = Block("closed form, no images", header, tuple(lines), (f"Assumes: {assumed.sentence()}.",))
+        numbers = {
+            "ours_um": ours,
+            "published_um": known,
+            "difference_um": ours - known,
+            "ratio": ours / known,
+            "distance_3d_um": row["distance_3d_um"],
+            VOLUME_COLUMN: row.get(VOLUME_COLUMN, math.nan),
+        }
+        records.append({"half_angle_deg": angle, **numbers, **sets.columns()})
+        lines.append((f"{angle:g}", *map(_hundredths, numbers.values())))
+    header = ("half angle [deg]", "in plane [um]", "paper", "difference", "ratio", "in 3D [um]", "in 3D, volume [um]")
+    block = Block("closed form, no images", header, tuple(lines), (f"Assumes: {sets.sentence()}.",))
     title = "Table I: greatest difference between cone-sphere curve and ellipse"
     return Table("table_1", title, pd.DataFrame(records), (block,), (NOTES["Table I"],))
+
+
+def _ratio(value: float, base: float | None) -> float:
+    return value / base if base else math.nan
+
+
+def _hundredths(value: float) -> str:
+    return f"{value:.2f}".replace("-0.00", "0.00") if math.isfinite(value) else "–"
 
 
 def at_reference(boxes: _Boxes, surface: str) -> _Boxes:
@@ -161,8 +175,8 @@ def _table_5(run: Run, variant: Variant, boxes: _Boxes) -> tuple[_Records, Block
         for record in _compare(key, box, "Table V"):
             quantity = record["quantity"]
             known = published_value("Table IV", key.trajectory, key.spotlights, quantity, key.metric)
-            ratio = record["ours"] / smooth[QUANTITIES[quantity]] if smooth else math.nan
-            paper = record["published"] / known if known else math.nan
+            ratio = _ratio(record["ours"], smooth.get(QUANTITIES[quantity]))
+            paper = _ratio(record["published"], known)
             records.append({**record, "over_smooth": ratio, "published_over_smooth": paper})
             if smooth:
                 error = key.metric.split("_")[0]
@@ -176,7 +190,7 @@ def _table_5(run: Run, variant: Variant, boxes: _Boxes) -> tuple[_Records, Block
 def _error_block(run: Run, variant: Variant, records: _Records, notes: tuple[str, ...] = ()) -> Block:
     found: dict[tuple[str, ...], dict[str, dict[str, Any]]] = {}
     for record in records:
-        where = record["source"] if record["trajectory"] == BOTH else record["trajectory"]
+        where = f"both ({record['source']})" if record["trajectory"] == BOTH else record["trajectory"]
         counts = (str(record["n"]), str(record["failed"]))
         line = (TABLE_METRICS[record["metric"]], where, record["spotlights"], *counts)
         found.setdefault(line, {})[record["quantity"]] = record
@@ -195,8 +209,7 @@ def _by_power(run: Run, variant: Variant, boxes: _Boxes) -> tuple[_Records, Bloc
     for key, box in boxes.items():
         watts = both_conventions(scene, key.power_w)
         flux = watts.flux_w if watts else math.nan
-        base = boxes.get(key._replace(power_w=quarter), {}).get("mean", math.nan)
-        relative = box["mean"] / base if base else math.nan
+        relative = _ratio(box["mean"], boxes.get(key._replace(power_w=quarter), {}).get("mean"))
         values = {name: box[name] for name in ("mean", "median", "max", "n", "failed")}
         isotropic = watts.isotropic_w if watts else math.nan
         both = {"isotropic_w": isotropic, "flux_w": flux}

@@ -8,6 +8,7 @@ import pandas as pd
 import pytest
 from ruamel.yaml import YAML
 
+from results import style
 from results.rows import COLUMNS
 from scene.document import read_document, shipped
 
@@ -97,6 +98,14 @@ def write_run(folder: Path, frame=None, *, document=None, theory=False, kind="pa
             "5,0.08,0.9\n7,0.23,1.9\n9,0.49,3.2\n11,0.90,5.1\n13,1.51,7.6\n15,2.35,10.6\n"
         )
     return folder
+
+
+@pytest.fixture(scope="session", autouse=True)
+def coarse_figures():
+    """No claim depends on the raster's size, and a third of the time does."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(style, "_DPI", 50)
+        yield
 
 
 @pytest.fixture(scope="session")

@@ -86,6 +86,18 @@ def test_table_i_stands_beside_the_distance_in_3d(tables_of):
     frame = made["table_1"].frame.set_index("half_angle_deg")
     assert frame.loc[9.0, ["ours_um", "published_um", "distance_3d_um"]].tolist() == [0.49, 0.49, 3.2]
     assert frame.loc[11.0, "difference_um"] == pytest.approx(-0.01)
+    assert frame["volume_distance_3d_um"].isna().all()
+
+
+def test_table_i_shows_the_distance_over_the_volume_where_the_run_has_it(tmp_path, make_run):
+    folder = make_run(tmp_path / "run")
+    (folder / "theory.csv").write_text(
+        "half_angle_deg,in_plane_um,distance_3d_um,volume_distance_3d_um\n9,0.4899,3.12,4.89\n10,0.7,4,6\n"
+    )
+    (table,) = make_tables(load_run(folder), None)
+    assert table.frame["volume_distance_3d_um"].tolist() == [4.89, 6.0]
+    assert table.blocks[0].lines[0] == ("9", "0.49", "0.49", "0.00", "1.00", "3.12", "4.89")
+    assert table.blocks[0].lines[1] == ("10", "0.70", "–", "–", "–", "4.00", "6.00")
 
 
 def test_a_table_needs_its_rows(tables_of, make_rows):
@@ -127,6 +139,15 @@ def test_where_every_frame_failed_the_count_stands_without_a_number(tables_of, m
     assert made["table_4"].frame["ours"].isna().all()
     assert (made["table_4"].frame["failed"] >= 3).all()
     assert "–" in made["table_4"].text()
+
+
+def test_errors_of_exactly_nothing_have_no_ratio(tables_of, make_rows):
+    frame = make_rows(poses=3, powers=(0.25, 1.0), surfaces=("smooth", "bumps"))
+    frame["position_error_mm"] = 0.0
+    made = tables_of(frame)
+    table = made["table_5"].frame
+    assert table.loc[table["metric"] == "position_error_mm", "over_smooth"].isna().all()
+    assert (made["table_4"].frame["ours"] == 0.0).any()
 
 
 def small_table(lines, heading="paper"):

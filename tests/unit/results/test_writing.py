@@ -125,13 +125,12 @@ def test_a_campaign_that_describes_no_scene_still_gives_results(tmp_path, make_r
 
 
 def test_what_the_rows_no_longer_give_is_removed_and_the_rest_left(tmp_path, make_run, make_rows):
-    folder = make_run(
-        tmp_path / "run", make_rows(poses=2, powers=(1.0,), trajectories=("box",), localizers=("paper",)), theory=True
-    )
+    frame = make_rows(poses=2, powers=(1.0,), trajectories=("box",), rigs=("single",), localizers=("paper",))
+    folder = make_run(tmp_path / "run", frame, theory=True)
     write_results(folder)
     (folder / "figures" / "mine.png").write_bytes(b"mine")
     (folder / "theory.csv").unlink()
-    make_rows(poses=2, powers=(1.0,), trajectories=("box",), localizers=("cone",)).to_parquet(folder / "errors.parquet")
+    frame.assign(localizer="cone").to_parquet(folder / "errors.parquet")
     files = write_results(folder)
     kept = {path.name for name in ("tables", "figures") for path in (folder / name).iterdir()}
     assert kept == {path.name for path in files if path.parent != folder} | {"mine.png"}
