@@ -45,9 +45,14 @@ class View:
         self._mi = mi
         reflectance = Reflectance(scene.retina)
         channels = spectral.channels(scene, light, responses)
+        self.channels = len(channels)
         apart = reflectance.is_spectral_map and not chosen.vectorized
+        # a channel whose filter blocks all of the light stays black; Mitsuba could not sample a wavelength for it
+        self._seen = [i for i, channel in enumerate(channels) if channel.film.integral() > 0.0]
         self._scenes = []
-        for group in [[channel] for channel in channels] if apart else [list(channels)]:
+        for group in [[channels[i]] for i in self._seen] if apart else [[channels[i] for i in self._seen]]:
+            if not group:
+                continue
             bsdf = mi.load_dict(reflectance.bsdf(mi, dr, group[0].film if apart else None))
             self.retina = retina_mesh(mi, scene, bsdf)
             integrator: dict[str, Any] = {"type": "direct", "emitter_samples": 1, "bsdf_samples": 0}
@@ -68,7 +73,6 @@ class View:
                 mi.load_dict({"type": "scene", "integrator": integrator, "sensor": sensor, **everything})
             )
         self._parameters = [mi.traverse(loaded) for loaded in self._scenes]
-        self.channels = len(channels)
 
     def update(self, values: Mapping[str, Any]) -> None:
         """Set parameters of the Mitsuba scene; they take effect with the next rendering."""
@@ -79,7 +83,7 @@ class View:
     def render(self, crop: Crop, samples: int, seed: int) -> Image:
         """The crop's radiance `[h, w, C]`, in bands of rows that keep a pass below `PASS` samples."""
         image = np.zeros((crop.height, crop.width, self.channels), np.float32)
-        if crop.height == 0 or crop.width == 0:
+        if crop.height == 0 or crop.width == 0 or not self._scenes:
             return image
         rows = max(1, min(crop.height, PASS // (crop.width * samples)))
         for band, first in enumerate(range(0, crop.height, rows)):
@@ -91,7 +95,7 @@ class View:
                 parameters.update()
                 rendered = self._mi.render(loaded, spp=samples, seed=(seed + 7919 * band) % 2**32)
                 layers.append(np.asarray(rendered).reshape(height, crop.width, -1))
-            image[first : first + height] = np.concatenate(layers, axis=-1)
+            image[first : first + height, :, self._seen] = np.concatenate(layers, axis=-1)
         return image
 
 
