@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from campaigns.plan import Case, Group, Plan, Unit, tile_seed
+from campaigns.plan import Case, Group, Plan, Unit, frame_seed, tile_seed
 from campaigns.row import Finding, Record, Vector
 from scene import Pose
 
@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from render import Exposure, Renderer, Tile
 
 #: loading scenes leaks memory in Mitsuba, so a worker that has loaded this many is replaced
-MAX_SCENES = 16
+MAX_SCENES = 64
 
 
 class Bench:
@@ -56,7 +56,7 @@ class Bench:
             exposure = Exposure(renderer.background(pose), group.scene.sensor)
         findings = []
         for case in group.cases:
-            image = exposure.frame(tiles, case.scene.power.value)
+            image = exposure.frame(tiles, case.scene.power.value, frame_seed(self._plan, unit, case))
             for localizer in case.localizers:
                 oracle = pose if localizer.endswith("-oracle") else None
                 found = locate(image, case.scene, localizer, oracle=oracle)

@@ -189,10 +189,11 @@ def _report(options: argparse.Namespace) -> Ending:
 
 
 def _write_results(folder: Path) -> None:
-    from results import write_results
+    from results import summary, write_results
 
-    for path in write_results(folder):
-        _say(path)
+    write_results(folder)
+    _say(summary(folder))
+    _say(f"{folder}: errors.csv, errors.parquet, boxes.csv, tables/, figures/; read report.html first")
 
 
 def _list(options: argparse.Namespace) -> Ending:

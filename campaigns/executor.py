@@ -13,12 +13,13 @@ import signal
 import traceback
 import warnings
 from collections import deque
-from collections.abc import Callable, Generator, Iterable, Iterator
+from collections.abc import Callable, Generator, Iterable, Iterator, Sequence
+from multiprocessing import resource_tracker
 from multiprocessing.connection import Connection, wait
 from pathlib import Path
 from typing import Protocol
 
-from campaigns.ending import RunError
+from campaigns.ending import RunError, held_back
 from campaigns.plan import Plan, Unit
 from campaigns.row import Record
 
@@ -45,6 +46,32 @@ def make_bench(plan: Plan, frames: Path | None) -> Measures:
     return Bench(plan, frames)
 
 
+class _Queue:
+    """Units that wait, by the scene they need."""
+
+    def __init__(self, plan: Plan, units: Iterable[Unit]) -> None:
+        self._plan = plan
+        self._scenes: dict[str, deque[Unit]] = {}
+        for unit in units:
+            self._scenes.setdefault(self.scene(unit), deque()).append(unit)
+
+    def scene(self, unit: Unit) -> str:
+        return self._plan.groups[unit.group].scene_key
+
+    def put_back(self, unit: Unit) -> None:
+        self._scenes.setdefault(self.scene(unit), deque()).appendleft(unit)
+
+    def take(self, loaded: str | None, elsewhere: Sequence[str | None]) -> Unit | None:
+        """The next unit: of the scene that is `loaded`, else of the one that is loaded least `elsewhere`."""
+        if not self._scenes:
+            return None
+        scene = loaded if loaded in self._scenes else min(self._scenes, key=elsewhere.count)
+        unit = self._scenes[scene].popleft()
+        if not self._scenes[scene]:
+            del self._scenes[scene]
+        return unit
+
+
 class _Worker:
     """A process and the unit it is busy with."""
 
@@ -52,19 +79,23 @@ class _Worker:
         context = multiprocessing.get_context("spawn")
         self.connection, theirs = context.Pipe()
         self.unit: Unit | None = None
+        self.scene: str | None = None
         self.process = context.Process(target=_work, args=(theirs, plan, frames, make), daemon=True)
-        with _environment(dict.fromkeys(_ONE_THREAD, "1")):
+        with _born():
             self.process.start()
         theirs.close()
 
-    def give(self, unit: Unit) -> None:
-        self.unit = unit
+    def give(self, unit: Unit, scene: str) -> None:
+        """Send a unit of a scene."""
+        self.unit, self.scene = unit, scene
         # a dead worker is found when its answer is awaited
         with contextlib.suppress(OSError):
             self.connection.send(unit)
 
-    def end(self) -> str:
+    def end(self, at_once: bool = False) -> str:
         """Stop the process; how it ended."""
+        if at_once:
+            self.process.kill()
         self.connection.close()
         self.process.join(timeout=0.5)
         if self.process.exitcode is None:
@@ -90,18 +121,19 @@ def execute(
 
     Raises RunError if workers cannot start. Closing the iterator stops the workers.
     """
-    waiting, again, suspects, noted = iter(units), deque[Unit](), set[str](), set[str]()
-    crew: list[_Worker] = []
+    queue, suspects, noted = _Queue(plan, units), set[str](), set[str]()
+    crew: list[_Worker | None] = [None] * workers
     lost, finished = 0, False
     try:
         while True:
-            for unit in _next(again, waiting, workers - sum(w.unit is not None for w in crew)):
-                idle = next((w for w in crew if w.unit is None), None)
-                if idle is None:
-                    idle = _Worker(plan, frames, make)
-                    crew.append(idle)
-                idle.give(unit)
-            busy = {w.connection: w for w in crew if w.unit is not None}
+            for i, worker in enumerate(crew):
+                if worker is None or worker.unit is None:
+                    elsewhere = [w.scene for w in crew if w is not None and w is not worker]
+                    unit = queue.take(worker.scene if worker else None, elsewhere)
+                    if unit is not None:
+                        crew[i] = worker = worker or _Worker(plan, frames, make)
+                        worker.give(unit, queue.scene(unit))
+            busy = {w.connection: w for w in crew if w is not None and w.unit is not None}
             if not busy:
                 return
             for connection in wait(list(busy)):
@@ -121,7 +153,7 @@ def execute(
                     continue
                 done, worker.unit = worker.unit, None
                 if kind in ("lost", "last"):
-                    crew.remove(worker)
+                    crew[crew.index(worker)] = None
                     worker.end()
                 if isinstance(answer, Record):
                     finished = True
@@ -132,19 +164,11 @@ def execute(
                 elif done is not None:
                     note(f"a worker {answer} at {plan.says(done)}; trying that pose once more")
                     suspects.add(done.key)
-                    again.append(done)
+                    queue.put_back(done)
     finally:
         for worker in crew:
-            if worker.unit is not None:
-                worker.process.kill()
-            worker.end()
-
-
-def _next(again: deque[Unit], waiting: Iterator[Unit], count: int) -> Iterator[Unit]:
-    for _ in range(count):
-        unit = again.popleft() if again else next(waiting, None)
-        if unit is not None:
-            yield unit
+            if worker is not None:
+                worker.end(at_once=worker.unit is not None)
 
 
 def _work(
@@ -184,15 +208,17 @@ def _sentence(error: BaseException) -> str:
 
 
 @contextlib.contextmanager
-def _environment(settings: dict[str, str]) -> Iterator[None]:
-    """Environment variables for the processes that are started meanwhile: set before they import anything."""
-    before = {key: os.environ.get(key) for key in settings}
-    os.environ.update(settings)
-    try:
-        yield
-    finally:
-        for key, value in before.items():
-            if value is None:
-                del os.environ[key]
-            else:
-                os.environ[key] = value
+def _born() -> Iterator[None]:
+    """Processes started meanwhile use one thread and never hear of Ctrl-C: both must be so before they run anything."""
+    before = {key: os.environ.get(key) for key in _ONE_THREAD}
+    resource_tracker.ensure_running()  # started with the first process, it would let the signal through
+    with held_back(signal.SIGINT):
+        os.environ.update(dict.fromkeys(_ONE_THREAD, "1"))
+        try:
+            yield
+        finally:
+            for key, value in before.items():
+                if value is None:
+                    del os.environ[key]
+                else:
+                    os.environ[key] = value

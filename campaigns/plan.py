@@ -103,13 +103,10 @@ class Plan:
     identity: str
 
     def units(self) -> Iterator[Unit]:
-        """The units of work, those of equal scenes together so that a worker loads a scene once."""
-        first: dict[str, int] = {}
+        """The units of work, in the order of the cases."""
         for g, group in enumerate(self.groups):
-            first.setdefault(group.scene_key, g)
-        for g in sorted(range(len(self.groups)), key=lambda g: first[self.groups[g].scene_key]):
-            for i in range(len(self.groups[g].positions)):
-                yield Unit(g, i, self.groups[g].unit(i))
+            for i in range(len(group.positions)):
+                yield Unit(g, i, group.unit(i))
 
     def says(self, unit: Unit) -> str:
         """The unit in words."""
@@ -139,8 +136,16 @@ class Plan:
 
 def tile_seed(plan: Plan, unit: Unit, spotlight: int) -> int:
     """The Monte Carlo seed of a tile, from the campaign's seed and what is rendered alone."""
-    sequence = np.random.SeedSequence([plan.campaign.seed, int(plan.groups[unit.group].key, 16), unit.pose, spotlight])
-    return int(sequence.generate_state(1)[0])
+    return _seed(plan, plan.groups[unit.group].key, unit.pose, spotlight)
+
+
+def frame_seed(plan: Plan, unit: Unit, case: Case) -> int:
+    """The seed of the sensor's noise in a case's frame, the same for every localizer."""
+    return _seed(plan, case.key, unit.pose)
+
+
+def _seed(plan: Plan, key: str, *numbers: int) -> int:
+    return int(np.random.SeedSequence([plan.campaign.seed, int(key, 16), *numbers]).generate_state(1)[0])
 
 
 def make_plan(document: Document) -> Plan:

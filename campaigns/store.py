@@ -11,10 +11,12 @@ import importlib.metadata
 import io
 import os
 import platform
+import signal
 from collections.abc import Iterator
 from pathlib import Path
 from typing import IO
 
+from campaigns.ending import held_back
 from campaigns.plan import Plan
 from campaigns.row import Record, rows
 from campaigns.schema import resolved
@@ -48,13 +50,16 @@ class Store:
 
     def append(self, record: Record) -> None:
         """Keep a finished unit: it is on the disk when this returns. Raises InputError if the disk refuses."""
-        try:
-            self._journal.write(record.model_dump_json(exclude_defaults=True).encode() + b"\n")
-            self._journal.flush()
-            os.fsync(self._journal.fileno())
-        except OSError as error:
-            raise InputError(f"{self.folder}: cannot be written: {error.strerror}; what is finished is kept") from None
-        self.records[record.unit] = record
+        with held_back(signal.SIGINT, signal.SIGTERM):
+            try:
+                self._journal.write(record.model_dump_json(exclude_defaults=True).encode() + b"\n")
+                self._journal.flush()
+                os.fsync(self._journal.fileno())
+            except OSError as error:
+                raise InputError(
+                    f"{self.folder}: cannot be written: {error.strerror}; finished poses are kept"
+                ) from None
+            self.records[record.unit] = record
 
     def write_rows(self) -> int:
         """Write errors.csv and errors.parquet of what is finished, in the plan's order; their number of rows."""

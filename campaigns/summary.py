@@ -12,7 +12,7 @@ from scene import Pose, Scene
 
 #: measured on one core: samples traced [1/s], and seconds a pixel to expose and localize a frame once
 RAYS_PER_SECOND = 12e6
-SECONDS_PER_PIXEL = 4e-9
+SECONDS_PER_PIXEL = 3e-9
 _MOST_CASES = 60
 
 

@@ -1,0 +1,71 @@
+"""The small commands: help, list, show, validate, plan, dry runs, doctor."""
+
+import subprocess
+import sys
+import time
+
+import pytest
+
+from scene.document import shipped
+
+CAMPAIGN = [sys.executable, "-m", "campaigns.command"]
+
+
+def campaign(*arguments, cwd):
+    return subprocess.run([*CAMPAIGN, *map(str, arguments)], cwd=cwd, capture_output=True, text=True, timeout=60)
+
+
+def test_help_is_instant_because_it_imports_nothing_heavy(tmp_path):
+    """The best of three, as other work may share the machine; and no module that takes time is loaded."""
+    times = []
+    for _ in range(3):
+        start = time.perf_counter()
+        done = campaign("--help", cwd=tmp_path)
+        times.append(time.perf_counter() - start)
+        assert done.returncode == 0
+    assert min(times) < 0.5
+    code = (
+        "import sys, campaigns.command\n"
+        "try: campaigns.command.main(['--help'])\n"
+        "except SystemExit: pass\n"
+        "print(*{'numpy', 'pydantic', 'ruamel', 'cv2', 'pandas', 'mitsuba'} & set(sys.modules), file=sys.stderr)"
+    )
+    loaded = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, cwd=tmp_path)
+    assert loaded.stderr == "\n"
+
+
+def test_list_names_every_shipped_campaign(tmp_path):
+    done = campaign("list", cwd=tmp_path)
+    assert [line.split()[0] for line in done.stdout.splitlines()] == sorted(shipped("campaigns", ""))
+
+
+@pytest.mark.parametrize("name", sorted(shipped("campaigns", "")))
+def test_every_shipped_campaign_is_valid_and_shows_itself(tmp_path, name):
+    assert campaign("validate", name, cwd=tmp_path).returncode == 0
+    shown = campaign("show", name, cwd=tmp_path).stdout
+    (tmp_path / "copy.yaml").write_text(shown)
+    assert campaign("validate", "copy.yaml", cwd=tmp_path).stdout.startswith("copy.yaml: valid")
+
+
+def test_plan_and_dry_run_say_the_same_and_write_nothing(tmp_path):
+    plan = campaign("plan", "power_sweep", "--poses", 10, "--workers", 2, cwd=tmp_path)
+    dry = campaign("run", "power_sweep", "--poses", 10, "--workers", 2, "--dry-run", cwd=tmp_path)
+    assert plan.returncode == dry.returncode == 0
+    assert plan.stdout == dry.stdout
+    assert "28 cases, 280 frames, 560 localizations" in plan.stdout
+    assert "0.25 W isotropic = 0.7695 mW flux" in plan.stdout
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_doctor_proves_that_this_machine_renders(tmp_path):
+    done = campaign("doctor", cwd=tmp_path)
+    assert done.returncode == 0, done.stderr
+    assert "variant " in done.stdout
+    assert "agrees" in done.stdout
+
+
+def test_a_closed_pipe_is_no_traceback(tmp_path):
+    command = f"{sys.executable} -m campaigns.command plan power_sweep | head -1"
+    done = subprocess.run(["bash", "-c", command], capture_output=True, text=True, cwd=tmp_path)
+    assert done.stderr == ""
+    assert done.stdout.startswith("power_sweep: ")

@@ -1,0 +1,152 @@
+"""`campaign run` at low resolution with real rendering: the same rows on any number of workers, through any crash."""
+
+import os
+import signal
+import subprocess
+import sys
+import time
+
+import pandas as pd
+import pytest
+
+CAMPAIGN = [sys.executable, "-m", "campaigns.command"]
+TEXT = """\
+scene: {preset: paper-code, camera: {resolution: 300}}
+trajectory: random
+poses: 10
+samples: 4
+localizers: [paper, paper-code]
+sweep:
+  scene.power.value: [0.25 W, 1 W]
+"""
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory):
+    path = tmp_path_factory.mktemp("campaign")
+    (path / "c.yaml").write_text(TEXT)
+    return path
+
+
+def campaign(*arguments, cwd):
+    return subprocess.run([*CAMPAIGN, *map(str, arguments)], cwd=cwd, capture_output=True, text=True, timeout=120)
+
+
+@pytest.fixture(scope="module")
+def straight(folder):
+    """A run on one worker without interruption."""
+    done = campaign("run", "c.yaml", "--workers", 1, "--out", "straight", cwd=folder)
+    assert done.returncode == 0, done.stderr
+    return folder / "straight", done
+
+
+def test_a_run_writes_rows_tables_and_a_report(straight):
+    run, done = straight
+    rows = pd.read_parquet(run / "errors.parquet")
+    assert len(rows) == 2 * 10 * 2
+    assert (rows["status"] == "ok").mean() > 0.8
+    assert rows["position_error_mm"].median() < 1.0  # at 300 px a pixel is 44 um
+    for name in ("campaign.yaml", "journal.jsonl", "errors.csv", "boxes.csv", "report.html", "tables", "figures"):
+        assert (run / name).exists()
+    assert not [p for p in run.rglob("*") if p.name.endswith(".tmp")]
+    assert "10 poses, 20 frames, 40 localizations" in done.stderr
+    assert "20 of 20 frames (100%)" in done.stderr
+    assert "straight: errors.csv, errors.parquet" in done.stdout
+
+
+def test_two_workers_give_the_same_bytes(folder, straight):
+    done = campaign("run", "c.yaml", "--workers", 2, "--out", "two", cwd=folder)
+    assert done.returncode == 0, done.stderr
+    assert (folder / "two" / "errors.csv").read_bytes() == (straight[0] / "errors.csv").read_bytes()
+
+
+def begin(folder, run, finished):
+    """Start a run and wait until that many poses are finished."""
+    process = subprocess.Popen(
+        [*CAMPAIGN, "run", "c.yaml", "--workers", "1", "--out", run.name],
+        cwd=folder,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+    )
+    journal = run / "journal.jsonl"
+    for _ in range(6000):
+        if process.poll() is not None or (journal.exists() and journal.read_bytes().count(b"\n") >= finished):
+            return process
+        time.sleep(0.01)
+    raise TimeoutError("nothing was finished in a minute")
+
+
+def test_an_interrupted_and_a_killed_run_go_on_to_the_same_bytes(folder, straight):
+    """Ctrl-C after one pose, kill -9 after another with a torn line behind it, then to the end."""
+    run = folder / "broken"
+    process = begin(folder, run, 1)
+    process.send_signal(signal.SIGINT)
+    _, err = process.communicate(timeout=30)
+    assert process.returncode == 130
+    assert "Traceback" not in err
+    assert "of 10 poses are kept, and the same command continues the run" in err
+    kept = pd.read_csv(run / "errors.csv")
+    assert 4 <= len(kept) < 40
+    assert len(pd.read_parquet(run / "errors.parquet")) == len(kept)
+
+    finished = (run / "journal.jsonl").read_bytes().count(b"\n")
+    process = begin(folder, run, finished + 1)
+    process.kill()
+    process.communicate(timeout=30)
+    with (run / "journal.jsonl").open("ab") as journal:
+        journal.write(b'{"unit":"ab')
+
+    done = campaign("run", "c.yaml", "--workers", 2, "--out", "broken", cwd=folder)
+    assert done.returncode == 0, done.stderr
+    assert "of 10 poses are finished, continuing" in done.stderr
+    assert (run / "errors.csv").read_bytes() == (straight[0] / "errors.csv").read_bytes()
+    assert (run / "errors.parquet").read_bytes() == (straight[0] / "errors.parquet").read_bytes()
+    assert (run / "journal.jsonl").read_bytes().count(b"\n") == 10
+
+
+def test_a_finished_run_does_nothing_again(folder, straight):
+    before = (straight[0] / "journal.jsonl").stat().st_mtime_ns
+    done = campaign("run", "c.yaml", "--out", "straight", cwd=folder)
+    assert done.returncode == 0
+    assert "10 of 10 poses are finished" in done.stderr
+    assert (straight[0] / "journal.jsonl").stat().st_mtime_ns == before
+
+
+def test_other_settings_do_not_overwrite_a_run(folder, straight):
+    before = (straight[0] / "errors.csv").read_bytes()
+    done = campaign("run", "c.yaml", "--seed", 2, "--out", "straight", cwd=folder)
+    assert done.returncode == 2
+    assert done.stderr == (
+        "campaign: straight: holds the run of another campaign or other settings; choose another --out\n"
+    )
+    assert (straight[0] / "errors.csv").read_bytes() == before
+
+
+def test_report_makes_everything_again_from_the_journal(folder, straight):
+    run, first = straight
+    rows = (run / "errors.csv").read_bytes()
+    for name in ("errors.csv", "errors.parquet", "report.html"):
+        (run / name).unlink()
+    done = campaign("report", "straight", cwd=folder)
+    assert done.returncode == 0, done.stderr
+    assert (run / "errors.csv").read_bytes() == rows
+    assert (run / "report.html").exists()
+    assert done.stdout == first.stdout
+
+
+def test_frames_are_kept_when_asked_for(folder):
+    options = ["--poses", 1, "--set", "frames=true", "--set", "sweep={}", "--resolution", 100, "--out", "kept"]
+    done = campaign("run", "c.yaml", "--workers", 1, *options, cwd=folder)
+    assert done.returncode == 0, done.stderr
+    assert sorted(p.suffix for p in (folder / "kept" / "frames").iterdir()) == [".exr", ".png"]
+
+
+def test_theory_alone_renders_nothing(tmp_path):
+    done = campaign("run", "theory", cwd=tmp_path)
+    assert done.returncode == 0, done.stderr
+    assert os.listdir(tmp_path / "runs") == ["theory"]
+    table = pd.read_csv(tmp_path / "runs" / "theory" / "theory.csv")
+    published = [0.08, 0.23, 0.49, 0.91, 1.51, 2.34]
+    assert table["in_plane_um"].tolist() == pytest.approx(published, abs=0.02)
+    assert "Table I" in done.stdout

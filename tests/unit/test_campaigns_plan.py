@@ -1,0 +1,148 @@
+"""campaigns.plan: cases by content, groups that share renderings, seeds that depend on nothing else."""
+
+import numpy as np
+import pytest
+
+from campaigns.plan import frame_seed, make_plan, tile_seed
+from campaigns.schema import override, read_campaign
+from campaigns.summary import summary
+from scene import InputError
+
+
+@pytest.fixture
+def plan(tmp_path):
+    def make(text):
+        (tmp_path / "c.yaml").write_text(text)
+        return make_plan(read_campaign(str(tmp_path / "c.yaml")))
+
+    return make
+
+
+def test_powers_and_localizers_cost_no_rendering(plan):
+    """Renderings of a campaign over one power and one localizer, against seven powers and two localizers: equal."""
+    one = plan("scene: paper\nposes: 4\nsweep: {scene.spotlights: [single, triple]}\n")
+    many = plan(
+        "scene: paper\nposes: 4\nlocalizers: [paper, paper-code]\n"
+        "sweep:\n  scene.spotlights: [single, triple]\n"
+        "  scene.power.value: [0.1 W, 0.2 W, 0.3 W, 0.4 W, 0.5 W, 0.6 W, 1 W]\n"
+    )
+    assert one.tiles == many.tiles == 4 + 12
+    assert one.scenes == many.scenes == 2
+    assert many.frames == 7 * one.frames
+    assert many.rows == 14 * one.rows
+    assert [u.pose for u in many.units()] == [u.pose for u in one.units()]
+
+
+def test_the_shipped_power_sweep_is_2800_frames_of_800_tiles():
+    sweep = make_plan(read_campaign("power_sweep"))
+    assert (len(sweep.cases), sweep.frames, sweep.rows, sweep.tiles, sweep.scenes) == (28, 2800, 5600, 800, 2)
+
+
+def test_a_case_is_what_it_holds_and_not_how_it_is_written(plan):
+    one = plan("scene: {preset: paper, power: {value: 500 mW}}\n")
+    other = plan("name: other\nscene: {preset: paper}\nsweep: {scene.power.value: [0.5 W]}\n")
+    assert [c.key for c in one.cases] == [c.key for c in other.cases]
+    assert one.identity == other.identity
+    assert plan("scene: {preset: paper}\nseed: 2\n").cases[0].key != one.cases[0].key
+
+
+def test_a_case_that_two_products_hold_stands_once_with_the_localizers_of_both(plan):
+    both = plan("scene: paper\nsweep:\n - {localizers: [[paper]]}\n - {localizers: [[paper-code, paper]]}\n")
+    assert [c.localizers for c in both.cases] == [("paper", "paper-code")]
+
+
+def test_a_table_of_positions_is_the_same_case_from_any_folder(plan, tmp_path):
+    rows = "x_mm,y_mm,z_mm\n0,0,3\n"
+    (tmp_path / "a.csv").write_text(rows)
+    (tmp_path / "b.csv").write_text(rows)
+    text = "scene: paper\nposes: 1\ntrajectory: {kind: csv, file: %s.csv}\n"
+    assert plan(text % "a").identity == plan(text % "b").identity
+
+
+def test_random_positions_are_the_same_in_every_scene_and_change_with_the_seed(plan):
+    text = "scene: paper\nposes: 5\ntrajectory: random\nseed: {}\nsweep: {{scene.surface: [smooth, bumps]}}\n"
+    first, second = plan(text.format(1)).groups
+    assert np.array_equal(first.positions, second.positions)
+    assert not np.array_equal(first.positions, plan(text.format(2)).groups[0].positions)
+
+
+def test_seeds_differ_by_pose_spotlight_case_and_campaign_seed_alone(plan):
+    text = "scene: paper\nposes: 3\nseed: {}\nsweep: {{scene.spotlights: [triple], scene.power.value: [0.5 W, 1 W]}}\n"
+    one = plan(text.format(1))
+    tiles = [tile_seed(one, u, k) for u in one.units() for k in range(3)]
+    frames = [frame_seed(one, u, c) for u in one.units() for c in one.cases]
+    assert len({*tiles, *frames}) == 15
+    assert tiles == [tile_seed(plan(text.format(1)), u, k) for u in one.units() for k in range(3)]
+    other = plan(text.format(2))
+    assert not {tile_seed(other, u, k) for u in other.units() for k in range(3)} & set(tiles)
+
+
+@pytest.mark.parametrize(
+    ("text", "says"),
+    [
+        (
+            "scene: paper\ntrajectory: {kind: helix, start_height: 20 mm}\n",
+            r"c\.yaml:2: pose \d+ of the helix: the tip at .* is outside the eye \(radius 12 mm\)",
+        ),
+        (
+            "scene: paper\nsweep:\n  trajectory:\n   - box\n   - {kind: line, end: [30 mm, 0 mm, 3 mm]}\n",
+            r"c\.yaml:5: pose",
+        ),
+        (
+            "scene: paper\ntrajectory: {kind: line, start: [6 mm, 0 mm, 22 mm]}\n",
+            "coincides with the remote centre of motion|outside",
+        ),
+        ("description: nothing\n", "scene: is required but missing"),
+        ("theory: [table-1]\nposes: 3\n", "scene: is required but missing"),
+        (
+            "scene: paper\nposes: 100000\nsweep: {scene.surface: [smooth, bumps], seed: [1, 2, 3, 4, 5, 6]}\n",
+            "more than 1000000 rows",
+        ),
+    ],
+)
+def test_a_campaign_that_cannot_be_planned_says_why(plan, text, says):
+    with pytest.raises(InputError, match=says):
+        plan(text)
+
+
+def test_too_few_positions_in_a_file_are_refused(plan, tmp_path):
+    (tmp_path / "tips.csv").write_text("x_mm,y_mm,z_mm\n0,0,3\n")
+    with pytest.raises(InputError, match="has 1 positions but 100 poses are asked for"):
+        plan("scene: paper\ntrajectory: {kind: csv, file: tips.csv}\n")
+
+
+def test_standing_columns_tell_the_papers_sweeps_apart(plan):
+    case = plan("scene: paper-code\nsweep: {trajectory: [helix], scene.surface: [bumps]}\n").cases[0]
+    assert case.labels == {
+        "trajectory": "helix",
+        "spotlights": "single",
+        "power_w": 1.0,
+        "illumination": "white",
+        "surface": "bumps",
+        "sensor": "srgb8",
+        "resolution_px": 5000,
+    }
+    assert case.swept == {}
+
+
+def test_other_swept_keys_become_columns_as_they_are_written(plan):
+    first = "{scene.beam.half_angle: [8 deg, 9.5 deg], scene.beam.blend: [0.5]}"
+    text = f"scene: paper\nsweep:\n - {first}\n - {{samples: [4]}}\n"
+    assert [c.swept for c in plan(text).cases] == [
+        {"beam.half_angle": "8 deg", "beam.blend": 0.5, "samples": 16},
+        {"beam.half_angle": "9.5 deg", "beam.blend": 0.5, "samples": 16},
+        {"beam.half_angle": "9 deg", "beam.blend": 1, "samples": 4},
+    ]
+
+
+def test_two_helices_bear_different_names(plan):
+    cases = plan("scene: paper\nsweep: {trajectory: [{kind: helix, turns: 2}, {kind: helix, turns: 1}, box]}\n").cases
+    assert [c.labels["trajectory"] for c in cases] == ["{kind: helix, turns: 2}", "{kind: helix, turns: 1}", "box"]
+
+
+def test_the_summary_states_both_power_conventions_and_the_renderings():
+    document = override(read_campaign("power_sweep"), "poses", "10", "--poses")
+    text = "\n".join(summary(make_plan(document), workers=2))
+    assert "1 W isotropic = 3.078 mW flux" in text
+    assert "80 tiles and 2 backgrounds are rendered" in text
+    assert "280 frames, 560 localizations" in text
