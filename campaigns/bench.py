@@ -17,6 +17,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from render import Exposure, Renderer, Tile
+    from scene.sensor import Sensor
 
 #: loading scenes leaks memory in Mitsuba, so a worker that has loaded this many is replaced
 MAX_SCENES = 64
@@ -53,7 +54,7 @@ class Bench:
         if group.scene.instrument.shaft is not None:
             from render import Exposure
 
-            exposure = Exposure(renderer.background(pose), group.scene.sensor)
+            exposure = Exposure(renderer.background(pose), exposure.sensor)
         findings = []
         for case in group.cases:
             image = exposure.frame(tiles, case.scene.power.value, frame_seed(self._plan, unit, case))
@@ -82,9 +83,29 @@ class Bench:
 
             self._loaded = None  # the old scene goes before the new one comes
             renderer = Renderer(group.scene, samples=group.samples)
-            self._loaded = group.scene_key, renderer, Exposure(renderer.background(), group.scene.sensor)
+            exposure = Exposure(renderer.background(), self._metered(group, renderer))
+            self._loaded = group.scene_key, renderer, exposure
             self._scenes += 1
         return self._loaded[1:]
+
+    def _metered(self, group: Group, renderer: Renderer) -> Sensor:
+        """The scene's sensor; one that meters, with the exposure time of the first pose at the brightest power.
+
+        It is a function of the plan alone, so that every worker and every resumed run exposes alike.
+        """
+        from render import Exposure
+
+        exposure = Exposure(renderer.background(), group.scene.sensor)
+        if not exposure.meters_once:
+            return group.scene.sensor
+        alike = [i for i, g in enumerate(self._plan.groups) if g.scene_key == group.scene_key]
+        first = self._plan.groups[alike[0]]
+        unit = Unit(alike[0], 0, first.unit(0))
+        tiles = [
+            renderer.tile(first.pose(0), k, tile_seed(self._plan, unit, k)) for k in range(len(group.scene.spotlights))
+        ]
+        brightest = max(case.scene.power.value for i in alike for case in self._plan.groups[i].cases)
+        return exposure.metered(tiles, brightest)
 
     def _keep(
         self,

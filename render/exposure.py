@@ -35,7 +35,7 @@ class Exposure:
 
     def __init__(self, background: NDArray[np.float32], sensor: Sensor) -> None:
         self._background = background
-        self._sensor = sensor
+        self.sensor = sensor
         if not isinstance(sensor, Emva):
             self._encoded = np.concatenate([encode(band, sensor) for band in np.array_split(background, 16)])
 
@@ -45,23 +45,29 @@ class Exposure:
         `seed` decides the noise of an EMVA 1288 camera; a Bayer camera's raw frame is interpolated to three channels.
         """
         lit = [tile for tile in tiles if tile.radiance.size]
-        if isinstance(self._sensor, Emva):
-            return self._noisy(self._sensor, lit, power_w, seed)
+        if isinstance(self.sensor, Emva):
+            return self._noisy(self.sensor, lit, power_w, seed)
         image = self._encoded.copy()
         if lit:
             crop, radiance = self._lit(lit, power_w)
-            image[crop.slices] = encode(radiance, self._sensor)
+            image[crop.slices] = encode(radiance, self.sensor)
         return image[..., 0] if image.shape[-1] == 1 else image
+
+    @property
+    def meters_once(self) -> bool:
+        """Whether the exposure time is still to be set, once and from the campaign's brightest frame, by `metered`."""
+        metering = self.sensor.metering if isinstance(self.sensor, Emva) else None
+        return metering is not None and metering.each == "campaign"
 
     def metered(self, tiles: Sequence[Tile], power_w: float) -> Sensor:
         """The sensor with the exposure time that its metering asks for in this frame, and keeps; else as it is."""
         lit = [tile for tile in tiles if tile.radiance.size]
-        if not isinstance(self._sensor, Emva) or self._sensor.metering is None or not lit:
-            return self._sensor
+        if not isinstance(self.sensor, Emva) or self.sensor.metering is None or not lit:
+            return self.sensor
         _, signal = self._lit(lit, power_w)
         reached = merged(lit)[1].max(axis=-1) > 0.0
-        time = emva.metered_time(signal[reached], self._sensor)
-        return self._sensor.model_copy(update={"exposure_time": time})
+        time = emva.metered_time(signal[reached], self.sensor)
+        return self.sensor.model_copy(update={"exposure_time": time})
 
     def _lit(self, tiles: Sequence[Tile], power_w: float) -> tuple[Crop, NDArray[np.float32]]:
         crop, total = merged(tiles)

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import math
-from typing import Annotated, Any, Literal
+from typing import Annotated, Literal
 
 import numpy as np
-from pydantic import BeforeValidator, Field, model_validator
+from pydantic import Field, model_validator
 
-from scene.model import Model, unknown_name
+from scene.model import Model
 from scene.quantity import Length, Seconds, Wavelength
 from scene.spectrum import Curve, published
 
@@ -134,24 +134,10 @@ class Emva(Model):
         return found
 
 
-_INFRARED = (LongPass(edge=800.0),)
+#: cameras by name: their exposure time is set once, from the campaign's brightest power
 EMVA_PRESETS: dict[str, Emva] = {
-    "cmv12000-mono": Emva(),
-    "cmv12000-nir": Emva(chip="cmv12000-nir"),
-    "cmv12000-nir-longpass800": Emva(chip="cmv12000-nir", filters=_INFRARED),
-    "cmv12000-rgb": Emva(chip="cmv12000-rgb"),
+    "cmv12000-mono": Emva(metering=Metering()),
+    "cmv12000-nir": Emva(chip="cmv12000-nir", metering=Metering()),
+    "cmv12000-nir-longpass800": Emva(chip="cmv12000-nir", filters=(LongPass(edge=800.0),), metering=Metering()),
+    "cmv12000-rgb": Emva(chip="cmv12000-rgb", metering=Metering()),
 }
-
-
-def _named_chip(value: Any) -> Any:
-    """A mapping may start from a preset: `{preset: cmv12000-nir, exposure_time: 5 ms}`."""
-    if isinstance(value, dict) and "preset" in value:
-        name = str(value["preset"])
-        if name not in EMVA_PRESETS:
-            raise unknown_name(name, list(EMVA_PRESETS), "sensor preset")
-        base = EMVA_PRESETS[name].model_dump(mode="json", exclude_defaults=True)
-        return {"kind": "emva", **base, **{k: v for k, v in value.items() if k != "preset"}}
-    return value
-
-
-PresetOrEmva = BeforeValidator(_named_chip)

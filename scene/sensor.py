@@ -6,7 +6,7 @@ from typing import Annotated, Any, Literal
 
 from pydantic import BeforeValidator, Field
 
-from scene.emva import EMVA_PRESETS, Emva, PresetOrEmva
+from scene.emva import EMVA_PRESETS, Emva
 from scene.model import Model, unknown_name
 from scene.quantity import Radiance
 
@@ -56,4 +56,4 @@ def sensor_name(sensor: AnySensor) -> str:
     return next(named, sensor.chip if isinstance(sensor, Emva) else sensor.kind)
 
 
-Sensor = Annotated[Annotated[AnySensor, Field(discriminator="kind")], PresetOrEmva, BeforeValidator(_named_sensor)]
+Sensor = Annotated[Annotated[AnySensor, Field(discriminator="kind")], BeforeValidator(_named_sensor)]

@@ -157,14 +157,19 @@ def test_metering_puts_the_percentile_at_its_level():
 
 
 def test_sensors_are_named_in_files(tmp_path):
-    """Names, presets with changes and filters in a document; against the models; a misspelt one against a hint."""
+    """Names, and descriptions with filters, in a document; against the models; a misspelt one against a hint."""
 
     def sensor_of(sensor):
         return read_scene(Document("scene.yaml", {"sensor": sensor}, {}, tmp_path)).sensor
 
     assert sensor_of("cmv12000-nir") == SENSORS["cmv12000-nir"]
     changed = sensor_of(
-        {"preset": "cmv12000-nir", "exposure_time": "5 ms", "filters": [{"kind": "longpass", "edge": "800 nm"}]}
+        {
+            "kind": "emva",
+            "chip": "cmv12000-nir",
+            "exposure_time": "5 ms",
+            "filters": [{"kind": "longpass", "edge": "800 nm"}],
+        }
     )
     assert changed == Emva(chip="cmv12000-nir", exposure_time=5e-3, filters=(LongPass(),))
     assert sensor_name(SENSORS["cmv12000-rgb"]) == "cmv12000-rgb"
