@@ -115,7 +115,7 @@ def read_table(path: Path, max_rows: int, text: Sequence[str] = ()) -> pa.Table:
         if path.stat().st_size > _MAX_BYTES:
             raise InputError(f"{path}: larger than {_MAX_BYTES // 1_000_000} MB, which no run's rows need")
         if path.suffix == ".parquet":
-            with pa.parquet.ParquetFile(path, arrow_extensions_enabled=False) as file:
+            with pa.parquet.ParquetFile(path) as file:
                 meta = file.metadata
                 inflated = sum(meta.row_group(i).total_byte_size for i in range(meta.num_row_groups))
                 _bound(path, meta.num_rows, meta.num_columns, max_rows)
