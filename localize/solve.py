@@ -1,0 +1,94 @@
+"""Robust least squares: Gauss-Newton with Levenberg's damping and Student-t weights."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from localize.prior import Estimate
+
+Array = NDArray[np.float64]
+#: degrees of freedom of the Student-t distribution residuals are taken to follow
+STUDENT = 4.0
+
+
+def student_weights(residuals: Array) -> Array:
+    """Weights of iteratively reweighted least squares for whitened residuals that follow Student's t."""
+    return np.asarray((STUDENT + 1.0) / (STUDENT + np.square(residuals)))
+
+
+def spread(residuals: Array) -> float:
+    """Robust standard deviation: 1.4826 times the median absolute value."""
+    return 1.4826 * float(np.median(np.abs(residuals))) if len(residuals) else 0.0
+
+
+@dataclass(frozen=True)
+class Solution:
+    """A minimum: the estimate, the information matrix there and the whitened residuals of the data."""
+
+    estimate: Estimate
+    information: Array  #: `[P, P]`, priors included
+    residuals: Array  #: `[N]`
+    converged: bool
+
+
+#: whitened residuals `[N]`, Jacobian `[N, P]`, prior residuals `[Q]` and rows `[Q, P]` at an estimate
+Problem = Callable[[Estimate], tuple[Array, Array, Array, Array]]
+
+
+def minimize(
+    problem: Problem,
+    start: Estimate,
+    pose_size: int,
+    free: tuple[str, ...],
+    *,
+    robust: bool = True,
+    iterations: int = 30,
+    tolerance: float = 1e-9,
+) -> Solution | None:
+    """The estimate that minimizes the (Student-t) cost; None when the problem is singular."""
+    estimate, damping = start, 1e-6
+    r, jac, pr, pj = problem(estimate)
+    cost = _cost(r, pr, robust)
+    converged = False
+    for _ in range(iterations):
+        if len(r) + len(pr) < 5 or not np.isfinite(cost):
+            return None
+        w = student_weights(r) if robust else np.ones_like(r)
+        information = (jac * w[:, None]).T @ jac + pj.T @ pj
+        gradient = (jac * w[:, None]).T @ r + pj.T @ pr
+        size = np.sqrt(np.maximum(np.diag(information), 1e-300))
+        scaled = information / np.outer(size, size)
+        for _ in range(8):
+            try:
+                step = -np.linalg.solve(scaled + damping * np.eye(len(size)), gradient / size) / size
+            except np.linalg.LinAlgError:
+                return None
+            if not np.all(np.isfinite(step)) or float(np.linalg.norm(step[3:pose_size])) > 1.0:
+                damping = max(damping * 10.0, 1e-3)
+                continue
+            trial = estimate.moved(step, pose_size, free)
+            new = problem(trial)
+            new_cost = _cost(new[0], new[2], robust)
+            if new_cost <= cost * (1.0 + 1e-12) + 1e-300:
+                break
+            damping = max(damping * 10.0, 1e-3)
+        else:
+            return Solution(estimate, information, r, True)
+        small = float(np.max(np.abs(step[:pose_size]))) < tolerance
+        estimate, (r, jac, pr, pj), cost = trial, new, new_cost
+        damping = max(damping / 10.0, 1e-15)
+        if small:
+            converged = True
+            break
+    w = student_weights(r) if robust else np.ones_like(r)
+    information = (jac * w[:, None]).T @ jac + pj.T @ pj
+    return Solution(estimate, information, r, converged)
+
+
+def _cost(r: Array, pr: Array, robust: bool) -> float:
+    data = (STUDENT + 1.0) * np.log1p(np.square(r) / STUDENT) if robust else np.square(r)
+    return float(np.sum(data) + np.sum(np.square(pr)))

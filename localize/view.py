@@ -1,0 +1,163 @@
+"""A window of the image, binned, with what its bins see and what the model predicts for them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from localize.forward import Sight, ambient_irradiance, light, look, window
+from localize.noise import NoiseModel, linear_light
+from localize.prior import Estimate, Knowns, value, with_value
+from scene.scene import Scene
+
+Array = NDArray[np.float64]
+_STEP = 1e-3  # of eye radius and camera height [mm], for differences
+
+
+@dataclass(frozen=True)
+class Window:
+    """Bins of `side` x `side` pixels that start at pixel (row, column)."""
+
+    row: int
+    column: int
+    height: int  #: [bins]
+    width: int  #: [bins]
+    side: int
+
+    @classmethod
+    def around(cls, estimate: Estimate, bins: int, margin: float) -> Window | None:
+        """The visible outlines with `margin` times their size around, `bins` bins across; None if out of the frame."""
+        scene = estimate.scene
+        points = outlines(estimate)
+        if not len(points):
+            return None
+        low, high = points.min(axis=0), points.max(axis=0)
+        size = float(np.max(high - low))
+        side = max(1, int(size / bins))
+        edge = scene.camera.resolution // side
+        low = np.maximum(np.floor((low - margin * size) / side), 0).astype(int)
+        high = np.minimum(np.ceil((high + margin * size) / side), edge).astype(int)
+        if np.any(high - low < 6):
+            return None
+        return cls(int(low[1]) * side, int(low[0]) * side, int(high[1] - low[1]), int(high[0] - low[0]), side)
+
+    def cut(self, image: NDArray[np.generic]) -> NDArray[np.generic]:
+        """The window's pixels of a full frame."""
+        return image[self.row : self.row + self.height * self.side, self.column : self.column + self.width * self.side]
+
+    def binned(self, pixels: NDArray[np.float32]) -> Array:
+        """Means over the bins `[h, w]` of the window's pixels."""
+        if self.side == 1:
+            return pixels.astype(float)
+        return cv2.resize(pixels, (self.width, self.height), interpolation=cv2.INTER_AREA).astype(float)
+
+
+def outlines(estimate: Estimate, points: int = 96) -> Array:
+    """Pixels `[N, 2]` [px] of all spotlights' outlines that are in the frame."""
+    scene = estimate.scene
+    found = []
+    for k in range(len(scene.spotlights)):
+        found.append(scene.camera.project(scene.outline(estimate.pose, k, points)))
+    pixels = np.concatenate(found)
+    inside = np.all((pixels > 0.0) & (pixels < scene.camera.resolution), axis=1)
+    return pixels[inside]
+
+
+@dataclass(frozen=True)
+class Channel:
+    """What one channel of the image shows in a window."""
+
+    signal: Array  #: mean of each bin [white] `[h, w]`
+    usable: NDArray[np.bool_]  #: bins without a clipped pixel
+    clipped: NDArray[np.bool_]  #: bins with every pixel clipped: lower bounds
+    template: Array  #: log albedo known from elsewhere, 0 if nothing is `[h, w]`
+    template_variance: Array  #: of that log albedo
+
+
+def channels(
+    image: NDArray[np.generic], scene: Scene, at: Window, reference: Array | None, noise: NoiseModel, frames: float
+) -> list[Channel]:
+    """The channels of an image `[H, W]` or `[H, W, 3]` in a window.
+
+    `reference` is the same view in ambient light alone, a mean over `frames` frames [white], `[H, W]` or `[H, W, 3]`.
+    """
+    light_, clip = linear_light(np.ascontiguousarray(at.cut(image)), scene)
+    signal = light_[..., None] if light_.ndim == 2 else light_
+    clip = clip[..., None] if clip.ndim == 2 else clip
+    found = []
+    irradiance = None
+    for c in range(signal.shape[2]):
+        share = at.binned(clip[..., c].astype(np.float32)) if clip[..., c].any() else np.zeros((at.height, at.width))
+        template, spread = np.zeros((at.height, at.width)), np.zeros((at.height, at.width))
+        if reference is not None:
+            if irradiance is None:
+                sight = look(scene, window(at.row, at.column, at.height, at.width, at.side), at.side)
+                irradiance = ambient_irradiance(sight, scene).reshape(at.height, at.width)
+            cut = at.cut(reference)
+            plane = at.binned(np.ascontiguousarray(cut if cut.ndim == 2 else cut[..., c], dtype=np.float32))
+            template, spread = _log_albedo(plane, irradiance, noise, frames * at.side**2)
+        found.append(
+            Channel(at.binned(np.ascontiguousarray(signal[..., c])), share == 0.0, share == 1.0, template, spread)
+        )
+    return found
+
+
+def _log_albedo(plane: Array, irradiance: Array, noise: NoiseModel, samples: float) -> tuple[Array, Array]:
+    """Log albedo and its variance from ambient light, smoothed as far as its noise exceeds the retina's own detail."""
+    level = max(float(np.median(plane)), 1e-9)
+    variance = float(noise.variance(np.array(level))) / samples / level**2
+    width = float(np.clip(0.5 * (variance / 1e-4) ** 0.25, 0.0, 2.5))
+    if width > 0.3:
+        plane = cv2.GaussianBlur(plane, (0, 0), width)
+        variance /= max(1.0, 4.0 * np.pi * width**2)
+    plane = np.maximum(plane, 0.1 * level)
+    return np.log(plane / np.maximum(irradiance, 1e-3)), variance * (level / plane) ** 2
+
+
+class Grid:
+    """A window's bins as the model sees them: light is computed only where the cones may reach."""
+
+    def __init__(self, at: Window, estimate: Estimate, knowns: Knowns, *, reach: int = 4) -> None:
+        """`reach` [bins] is how far the outline may still move."""
+        self.at, self.knowns = at, knowns
+        scene = estimate.scene
+        pixels = window(at.row, at.column, at.height, at.width, at.side)
+        self._pixels = pixels
+        mask = np.zeros((at.height, at.width), np.uint8)
+        for k in range(len(scene.spotlights)):
+            points = scene.camera.project(scene.outline(estimate.pose, k, 64))
+            points = points[np.all(np.isfinite(points), axis=1)]
+            if len(points) > 2:
+                bins = (points - [at.column, at.row]) / at.side - 0.5
+                cv2.fillPoly(mask, [np.round(bins).astype(np.int32)], 1)
+        near = cv2.dilate(mask, np.ones((2 * reach + 1, 2 * reach + 1), np.uint8))
+        self.lit = np.flatnonzero(near)
+        sight = look(scene, pixels, at.side)
+        ambient = ambient_irradiance(sight, scene)
+        self.seen = np.isfinite(ambient)
+        self.ambient = np.where(self.seen, ambient, 1.0)
+        self._sight = Sight(*(field[self.lit] for field in vars(sight).values()))
+
+    def spotlight(self, estimate: Estimate, *, roll: bool) -> tuple[Array, Array]:
+        """The spotlights' irradiance on the lit bins `[N]` and its derivatives by pose and free quantities `[P, N]`."""
+        free = self.knowns.free
+        sight = self._sight if not {"eye_radius", "camera_height"} & set(free) else self._look(estimate.scene)
+        profile = estimate.profile
+        here = light(sight, estimate.pose, estimate.scene, profile, roll=roll, half_angle="half_angle" in free)
+        rows = [here.jacobian[: 6 if roll else 5]]
+        for name in free:
+            if name == "half_angle":
+                rows.append(here.jacobian[-1:])
+                continue
+            sides = []
+            for step in (_STEP, -_STEP):
+                other = with_value(estimate.scene, name, value(estimate.scene, name) + step)
+                sides.append(light(self._look(other), estimate.pose, other, profile).value)
+            rows.append(((sides[0] - sides[1]) / (2.0 * _STEP))[None])
+        return here.value, np.concatenate(rows)
+
+    def _look(self, scene: Scene) -> Sight:
+        return look(scene, self._pixels[self.lit], self.at.side)
