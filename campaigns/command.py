@@ -97,6 +97,9 @@ def _parser() -> argparse.ArgumentParser:
     add("show", _show, "print a campaign's file").add_argument("campaign")
     report = add("report", _report, "make the tables, figures and report of a run folder again")
     report.add_argument("folder", type=Path, metavar="RUN")
+    compare = add("compare", _compare, "compare two lights pose by pose, in one run or several")
+    compare.add_argument("folders", type=Path, nargs="+", metavar="RUN")
+    compare.add_argument("--lights", metavar="A,B", help="reference and other light (default: the first against all)")
     add("doctor", _doctor, "say what this machine renders with, and prove it")
     return parser
 
@@ -185,6 +188,14 @@ def _report(options: argparse.Namespace) -> Ending:
         with open_store(folder, make_plan(document), document) as store:
             store.write_rows()
     _write_results(folder)
+    return Ending.DONE
+
+
+def _compare(options: argparse.Namespace) -> Ending:
+    from campaigns.compare import compare
+
+    _say(compare(options.folders, options.lights))
+    _say(f"{options.folders[0]}: comparison.txt, tables/comparison.csv, figures/comparison_*")
     return Ending.DONE
 
 

@@ -11,24 +11,49 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from render import spectral
 from scene import InputError, Pose, Scene
 from scene.atomic import write_atomically
 from scene.document import dump
+from scene.spectrum import Curve
 
 
 def frame_header(scene: Scene, pose: Pose, power_w: float, versions: Mapping[str, str]) -> dict[str, str | float]:
-    """What a frame's EXR header says: pose, power with its convention, wavelengths, versions and the whole scene."""
+    """What a frame's EXR header says: pose, power, wavelengths, response curves, versions and the scene."""
     apex, axis = pose.apex, pose.axis
     return {
-        "conespot.unit": "W m-2 sr-1",
+        "conespot.unit": spectral.unit(scene),
         "conespot.apex_mm": " ".join(f"{c:.9g}" for c in apex),
         "conespot.axis": " ".join(f"{c:.9g}" for c in axis),
         "conespot.power_w": float(power_w),
         "conespot.power_convention": scene.power.convention,
         "conespot.wavelengths_nm": f"{scene.illumination.spectrum.low:g} {scene.illumination.spectrum.high:g}",
         "conespot.scene": dump(scene),
+        **_curves(scene),
         **{f"conespot.version.{name}": version for name, version in versions.items()},
     }
+
+
+def _curves(scene: Scene) -> dict[str, str]:
+    """Name and spectral response of every channel, and the light's spectrum [1/nm], as `wavelength:value` pairs."""
+    found = spectral.channels(scene, scene.illumination)
+    curves = {f"response.{label}": c.response for label, c in zip(_labels(len(found)), found, strict=True)}
+    curves["light"] = scene.illumination.spectrum
+    names = {f"conespot.channel.{label}": c.name for label, c in zip(_labels(len(found)), found, strict=True)}
+    return names | {f"conespot.{name}": _written(curve) for name, curve in curves.items()}
+
+
+def _written(curve: Curve) -> str:
+    """A curve at its own points, or where it has many, every 5 nm."""
+    at = curve.wavelengths
+    if len(at) > 64:
+        inner = np.arange(np.ceil(curve.low / 5.0) * 5.0, curve.high, 5.0)
+        at = np.unique([curve.low, *inner, curve.high])
+    return " ".join(f"{w:g}:{v:.6g}" for w, v in zip(at, curve(at), strict=True))
+
+
+def _labels(channels: int) -> list[str]:
+    return ["Y"] if channels == 1 else [f"C{i}" for i in range(channels)]
 
 
 def write_frame(path: Path, radiance: NDArray[np.float32], header: Mapping[str, str | float]) -> None:
@@ -38,7 +63,7 @@ def write_frame(path: Path, radiance: NDArray[np.float32], header: Mapping[str, 
     """
     import OpenEXR
 
-    names = ["Y"] if radiance.shape[-1] == 1 else [f"C{i}" for i in range(radiance.shape[-1])]
+    names = _labels(radiance.shape[-1])
     channels = {name: np.ascontiguousarray(radiance[..., i]) for i, name in enumerate(names)}
     # OpenEXR writes to a path only, so the file is made beside its place and renamed
     temporary = path.with_name(f".{secrets.token_hex(4)}.exr")
