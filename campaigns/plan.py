@@ -7,34 +7,21 @@ rendered once, then exposed at every power and handed to every localizer.
 from __future__ import annotations
 
 import json
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
-from typing import Any
+from collections.abc import Iterator
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
 from pydantic import BaseModel
 
-from campaigns.schema import Campaign, base, combinations, makes_frames, sweep_products
+from campaigns.labels import label_columns, swept_columns, without_files
+from campaigns.schema import Campaign, Combination, base, combinations, makes_frames
 from scene import InputError, Pose, Scene
 from scene.document import Document
 from scene.model import identity
-from scene.spotlights import rig_name
-from scene.surface import surface_name
 
 #: frames times localizers; no more than the results read back
 MAX_ROWS = 1_000_000
-
-#: swept keys that a column of every row already tells apart: the column and its short name
-_LABELS: dict[str, tuple[str, Callable[[Campaign], str | float]]] = {
-    "trajectory": ("trajectory", lambda c: c.trajectory.kind),
-    "scene.spotlights": ("spotlights", lambda c: rig_name(c.scene.spotlights)),
-    "scene.power.value": ("power_w", lambda c: c.scene.power.value),
-    "scene.illumination": ("illumination", lambda c: c.scene.illumination.name),
-    "scene.surface": ("surface", lambda c: surface_name(c.scene.surface)),
-    "scene.sensor": ("sensor", lambda c: c.scene.sensor.kind),
-    "scene.camera.resolution": ("resolution_px", lambda c: c.scene.camera.resolution),
-}
 
 
 @dataclass(frozen=True)
@@ -148,54 +135,50 @@ def _seed(plan: Plan, key: str, *numbers: int) -> int:
     return int(np.random.SeedSequence([plan.campaign.seed, int(key, 16), *numbers]).generate_state(1)[0])
 
 
+@dataclass
+class _Draft:
+    """A case while combinations are still being found that are the same one."""
+
+    combination: Combination
+    group: str
+    localizers: list[str] = field(default_factory=list)
+
+
 def make_plan(document: Document) -> Plan:
     """Validate every combination, with every pose inside its eye, and plan the work. Raises InputError."""
     campaign = base(document)
-    found: dict[str, tuple[Document, Campaign]] = {}
-    localizers: dict[str, list[str]] = {}
-    groups: dict[str, tuple[Campaign, NDArray[np.float64], list[str]]] = {}
+    drafts: dict[str, _Draft] = {}
+    positions: dict[str, NDArray[np.float64]] = {}
     rows = 0
-    for combination, case in combinations(document) if makes_frames(document) else ():
-        key = _address(case.scene, case.trajectory, case.poses, case.samples, case.seed)
-        found.setdefault(key, (combination, case))
-        new = [name for name in case.localizers if name not in localizers.setdefault(key, [])]
-        localizers[key] += new
+    for combination in combinations(document) if makes_frames(document) else ():
+        case = combination.campaign
+        visited = (case.trajectory, case.poses, case.samples, case.seed)
+        group = _address(_at_one_watt(case.scene), *visited)
+        draft = drafts.setdefault(_address(case.scene, *visited), _Draft(combination, group))
+        new = [name for name in case.localizers if name not in draft.localizers]
+        draft.localizers += new
         rows += case.poses * len(new)
         if rows > MAX_ROWS:
-            raise InputError(
-                f"{combination.place(['sweep'])}: more than {MAX_ROWS} rows; use fewer poses or sweep less"
-            )
-        group = _address(_at_one_watt(case.scene), case.trajectory, case.poses, case.samples, case.seed)
-        if group not in groups:
-            groups[group] = (case, _positions(combination, case), [])
-        if key not in groups[group][2]:
-            groups[group][2].append(key)
-    labels, swept = _labels(document, list(found.values())), _swept(document, list(found.values()))
-    cases = {
-        key: Case(
-            key,
-            case.scene,
-            tuple(localizers[key]),
-            {name: values[i] for name, values in labels.items()},
-            {name: values[i] for name, values in swept.items()},
-        )
-        for i, (key, (_, case)) in enumerate(found.items())
-    }
-    parts = [campaign.theory, campaign.frames, sorted((k, sorted(c.localizers)) for k, c in cases.items())]
-    return Plan(
-        campaign,
-        tuple(cases.values()),
-        tuple(_group(key, *parts, cases) for key, parts in groups.items()),
-        identity(json.dumps(parts)),
-    )
-
-
-def _group(
-    key: str, case: Campaign, positions: NDArray[np.float64], members: list[str], cases: Mapping[str, Case]
-) -> Group:
-    scene = _at_one_watt(case.scene)
-    shared = tuple(cases[k] for k in members)
-    return Group(key, _address(scene, case.samples), scene, case.samples, positions, shared)
+            where = combination.document.place(["sweep"])
+            raise InputError(f"{where}: more than {MAX_ROWS} rows; use fewer poses or sweep over less")
+        if group not in positions:
+            positions[group] = _positions(combination)
+    found = [draft.combination for draft in drafts.values()]
+    labels, swept = label_columns(found), swept_columns(found)
+    cases: list[Case] = []
+    members: dict[str, list[Case]] = {}
+    for i, (key, draft) in enumerate(drafts.items()):
+        columns = [{name: values[i] for name, values in table.items()} for table in (labels, swept)]
+        cases.append(Case(key, draft.combination.campaign.scene, tuple(draft.localizers), *columns))
+        members.setdefault(draft.group, []).append(cases[-1])
+    groups = []
+    for key, shared in members.items():
+        case = drafts[shared[0].key].combination.campaign
+        scene = _at_one_watt(case.scene)
+        scene_key = _address(scene, case.samples)
+        groups.append(Group(key, scene_key, scene, case.samples, positions[key], tuple(shared)))
+    parts = [campaign.theory, campaign.frames, sorted((c.key, sorted(c.localizers)) for c in cases)]
+    return Plan(campaign, tuple(cases), tuple(groups), identity(json.dumps(parts)))
 
 
 def _at_one_watt(scene: Scene) -> Scene:
@@ -204,19 +187,14 @@ def _at_one_watt(scene: Scene) -> Scene:
 
 def _address(*parts: BaseModel | int) -> str:
     """A content address that does not change with the place of the files some values came from."""
-    plain = [_unfiled(part.model_dump(mode="json")) if isinstance(part, BaseModel) else part for part in parts]
+    plain = [without_files(part.model_dump(mode="json")) if isinstance(part, BaseModel) else part for part in parts]
     return identity(json.dumps(plain, sort_keys=True))
 
 
-def _unfiled(data: Any) -> Any:
-    if isinstance(data, dict):
-        return {k: _unfiled(v) for k, v in data.items() if not (k == "file" and data.get("points"))}
-    return [_unfiled(item) for item in data] if isinstance(data, list) else data
-
-
-def _positions(document: Document, case: Campaign) -> NDArray[np.float64]:
+def _positions(combination: Combination) -> NDArray[np.float64]:
     """The tips `[N, 3]` [mm] of a case's poses, all inside the eye. Raises InputError."""
-    scene, place = case.scene, document.place(["trajectory"])
+    case, place = combination.campaign, combination.document.place(["trajectory"])
+    scene = case.scene
     # the same trajectory visits the same places in every scene, so that cases can be compared pose by pose
     key = int(_address(case.trajectory, case.poses), 16)
     try:
@@ -231,51 +209,3 @@ def _positions(document: Document, case: Campaign) -> NDArray[np.float64]:
         except ValueError as error:
             raise InputError(f"{place}: pose {i} of the {case.trajectory.kind}: {error}") from None
     return positions
-
-
-def _labels(document: Document, found: Sequence[tuple[Document, Campaign]]) -> dict[str, Sequence[str | float]]:
-    """The standing columns that say what a case is, one value a case.
-
-    Where a swept key gives two cases the same short name (two helices), it is the value as the file writes it.
-    """
-    swept = {axis.key for axes in sweep_products(document) for axis in axes}
-    columns: dict[str, Sequence[str | float]] = {}
-    for key, (name, short) in _LABELS.items():
-        names = [short(case) for _, case in found]
-        values = [json.dumps(_unfiled(_dumped(case, key)), sort_keys=True) for _, case in found]
-        clash = key in swept and len(set(zip(names, values, strict=True))) > len(set(names))
-        columns[name] = [_written(d, c, key) for d, c in found] if clash else names
-    return columns
-
-
-def _swept(document: Document, found: Sequence[tuple[Document, Campaign]]) -> dict[str, Sequence[str | float]]:
-    """A column for every swept key that no standing one tells: its path, within the scene if that leaves a dot."""
-    columns: dict[str, Sequence[str | float]] = {}
-    for axis in (axis for axes in sweep_products(document) for axis in axes):
-        if axis.key not in _LABELS and axis.key != "localizers":
-            inner = axis.key.removeprefix("scene.")
-            values = [_written(d, c, axis.key) for d, c in found]
-            numbers = all(isinstance(v, (int, float)) for v in values)
-            columns[inner if "." in inner else axis.key] = values if numbers else [str(v) for v in values]
-    return columns
-
-
-def _dumped(case: Campaign, key: str) -> Any:
-    data: Any = case.model_dump(mode="json")
-    for part in key.split("."):
-        data = data.get(part) if isinstance(data, dict) else None
-    return data
-
-
-def _written(document: Document, case: Campaign, key: str) -> str | float:
-    """The value of a key as the file writes it, or as it would be written where the file leaves it out."""
-    value: Any = document.data
-    for part in key.split("."):
-        value = value.get(part) if isinstance(value, dict) else None
-    value = _dumped(case, key) if value is None else value
-    if isinstance(value, dict) and len(value) == 1:
-        value = next(iter(value.values()))  # `scene: {preset: paper}` was written as a word
-    if isinstance(value, str) or (isinstance(value, (int, float)) and not isinstance(value, bool)):
-        return value
-    text = json.dumps(value).replace('"', "")
-    return text if len(text) <= 120 else f"{text[:100]}... {identity(text)}"

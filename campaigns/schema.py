@@ -71,6 +71,15 @@ class Axis:
     at: Path_
 
 
+@dataclass(frozen=True)
+class Combination:
+    """One combination of what is swept: the campaign, its file as if nothing were, and the items `chosen` by key."""
+
+    campaign: Campaign
+    document: Document
+    chosen: dict[str, Any]
+
+
 def read_campaign(name: str) -> Document:
     """The file of a campaign, a path or the name of a shipped one. Raises InputError."""
     document = read_document(find_document(name, "campaigns", "", "campaign"))
@@ -173,23 +182,23 @@ def base(document: Document) -> Campaign:
     return _expanded(_unswept(document)).validate(Campaign)
 
 
-def combinations(document: Document) -> Iterator[tuple[Document, Campaign]]:
-    """Every combination, its presets expanded, in the order of the file with the last key fastest.
+def combinations(document: Document) -> Iterator[Combination]:
+    """Every combination in the order of the file, the last key fastest.
 
     Raises InputError for the first that is not a campaign, with the line of the swept item that makes it so.
     """
     unswept = _unswept(document)
     for axes in sweep_products(document):
         for picks in itertools.product(*(range(len(axis.items)) for axis in axes)):
-            combination = unswept
+            laid, chosen = unswept, {}
             for axis, i in zip(axes, picks, strict=True):
-                combination = _picked(combination, axis, i)
-            expanded = _expanded(combination)
+                laid = _picked(laid, axis, i)
+                chosen[axis.key] = axis.items[i]
             try:
-                yield expanded, expanded.validate(Campaign)
+                yield Combination(_expanded(laid).validate(Campaign), laid, chosen)
             except InputError as error:
-                chosen = ", ".join(f"{axis.key}: {axis.items[i]}" for axis, i in zip(axes, picks, strict=True))
-                raise InputError(f"{error} (in the combination {chosen})" if len(axes) > 1 else str(error)) from None
+                which = ", ".join(f"{key}: {item}" for key, item in chosen.items())
+                raise InputError(f"{error} (in the combination {which})" if len(axes) > 1 else str(error)) from None
 
 
 def _unswept(document: Document) -> Document:

@@ -6,9 +6,11 @@ import math
 from collections.abc import Iterator
 
 import numpy as np
+from numpy.typing import NDArray
 
 from campaigns.plan import Case, Plan
 from scene import Pose, Scene
+from scene.exposure_limits import RetinalExposure, scene_exposure
 
 #: measured on one core: samples traced [1/s], and seconds a pixel to expose and localize a frame once
 RAYS_PER_SECOND = 12e6
@@ -37,9 +39,24 @@ def summary(plan: Plan, workers: int) -> Iterator[str]:
         f"({len(plan.groups)} groups of cases)"
     )
     yield f"about {_duration(_seconds(plan) / workers)} on {workers} workers (on cores like those it was tuned on)"
+    yield from _exposures(plan)
     if campaign.frames:
         size = sum(len(g.positions) * len(g.cases) * 4.0 * g.scene.camera.resolution**2 for g in plan.groups)
         yield f"frames take up to {size / 1e9:.1f} GB on the disk"
+
+
+def _exposures(plan: Plan) -> Iterator[str]:
+    """The retinal exposure of every light at its brightest, over up to 100 poses."""
+    worst: dict[str, RetinalExposure] = {}
+    for group in plan.groups:
+        case = max(group.cases, key=lambda c: c.scene.power.value)
+        poses = [group.pose(int(i)) for i in _spread(len(group.positions), 100)]
+        found = scene_exposure(case.scene, poses, case.scene.power.value)
+        light = str(case.labels["illumination"])
+        if light not in worst or found.irradiance > worst[light].irradiance:
+            worst[light] = found
+    for light, found in worst.items():
+        yield f"{light}, brightest: {found.sentence}"
 
 
 def _both(case: Case) -> str:
@@ -60,13 +77,21 @@ def _seconds(plan: Plan) -> float:
             seen.add(group.scene_key)
             total += 3.0 + 4.0 * pixels / RAYS_PER_SECOND
         poses = len(group.positions)
-        few = np.unique(np.linspace(0, poses - 1, 5).astype(int))
         tile = np.mean(
-            [_tile_pixels(group.scene, group.pose(int(i)), k) for i in few for k in range(len(group.scene.spotlights))]
+            [
+                _tile_pixels(group.scene, group.pose(int(i)), k)
+                for i in _spread(poses, 5)
+                for k in range(len(group.scene.spotlights))
+            ]
         )
         rays = float(tile) * len(group.scene.spotlights) * group.samples
         total += poses * (rays / RAYS_PER_SECOND + group.rows * pixels * SECONDS_PER_PIXEL)
     return total
+
+
+def _spread(count: int, most: int) -> NDArray[np.int_]:
+    """Up to `most` numbers evenly spread over range(count)."""
+    return np.unique(np.linspace(0, count - 1, most).astype(int))
 
 
 def _tile_pixels(scene: Scene, pose: Pose, spotlight: int) -> float:

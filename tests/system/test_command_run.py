@@ -15,7 +15,7 @@ scene: {preset: paper-code, camera: {resolution: 300}}
 trajectory: random
 poses: 10
 samples: 4
-localizers: [paper, paper-code]
+localizers: [paper]
 sweep:
   scene.power.value: [0.25 W, 1 W]
 """
@@ -43,13 +43,13 @@ def straight(folder):
 def test_a_run_writes_rows_tables_and_a_report(straight):
     run, done = straight
     rows = pd.read_parquet(run / "errors.parquet")
-    assert len(rows) == 2 * 10 * 2
+    assert len(rows) == 2 * 10
     assert (rows["status"] == "ok").mean() > 0.8
     assert rows["position_error_mm"].median() < 1.0  # at 300 px a pixel is 44 um
     for name in ("campaign.yaml", "journal.jsonl", "errors.csv", "boxes.csv", "report.html", "tables", "figures"):
         assert (run / name).exists()
     assert not [p for p in run.rglob("*") if p.name.endswith(".tmp")]
-    assert "10 poses, 20 frames, 40 localizations" in done.stderr
+    assert "10 poses, 20 frames, 20 localizations" in done.stderr
     assert "20 of 20 frames (100%)" in done.stderr
     assert "straight: errors.csv, errors.parquet" in done.stdout
 
@@ -65,6 +65,7 @@ def begin(folder, run, finished):
     process = subprocess.Popen(
         [*CAMPAIGN, "run", "c.yaml", "--workers", "1", "--out", run.name],
         cwd=folder,
+        start_new_session=True,
         stdout=subprocess.PIPE,
         stderr=subprocess.PIPE,
         text=True,
@@ -81,13 +82,13 @@ def test_an_interrupted_and_a_killed_run_go_on_to_the_same_bytes(folder, straigh
     """Ctrl-C after one pose, kill -9 after another with a torn line behind it, then to the end."""
     run = folder / "broken"
     process = begin(folder, run, 1)
-    process.send_signal(signal.SIGINT)
+    os.killpg(process.pid, signal.SIGINT)  # a terminal sends Ctrl-C to the workers too
     _, err = process.communicate(timeout=30)
     assert process.returncode == 130
     assert "Traceback" not in err
     assert "of 10 poses are kept, and the same command continues the run" in err
     kept = pd.read_csv(run / "errors.csv")
-    assert 4 <= len(kept) < 40
+    assert 2 <= len(kept) < 20
     assert len(pd.read_parquet(run / "errors.parquet")) == len(kept)
 
     finished = (run / "journal.jsonl").read_bytes().count(b"\n")

@@ -135,6 +135,12 @@ def test_other_swept_keys_become_columns_as_they_are_written(plan):
     ]
 
 
+def test_swept_presets_are_called_by_their_names(plan):
+    for key in ("scene", "scene.preset"):
+        cases = plan(f"scene: {{camera: {{resolution: 300}}}}\nsweep: {{{key}: [paper, paper-code]}}\n").cases
+        assert [c.swept for c in cases] == [{key: "paper"}, {key: "paper-code"}]
+
+
 def test_two_helices_bear_different_names(plan):
     cases = plan("scene: paper\nsweep: {trajectory: [{kind: helix, turns: 2}, {kind: helix, turns: 1}, box]}\n").cases
     assert [c.labels["trajectory"] for c in cases] == ["{kind: helix, turns: 2}", "{kind: helix, turns: 1}", "box"]

@@ -31,7 +31,7 @@ def campaign(tmp_path):
 
 
 def cases(document):
-    return [case for _, case in combinations(document)]
+    return [combination.campaign for combination in combinations(document)]
 
 
 def complaint(document):
