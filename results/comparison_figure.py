@@ -6,7 +6,7 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from results.comparison import Comparison
-from results.style import COLOURS, frame
+from results.style import COLOURS, frame, plain_numbers
 
 _MOST_PANELS = 6
 
@@ -35,10 +35,15 @@ def comparison_figure(comparison: Comparison) -> Figure:
         error = 1e3 * np.abs(np.stack([part["median"] - part["low"], part["high"] - part["median"]]))
         below.errorbar(at, 1e3 * part["median"], yerr=error, fmt="s", color=COLOURS["overall"], capsize=3.0)
         below.axhline(0.0, color=COLOURS["quiet"], linewidth=0.8)
-        above.set_yscale("log")
         above.set_title(", ".join(map(str, values)), loc="left", pad=14.0)
         below.set_xticks(at, [f"{power:g}" for power in part["power_w"]])
         below.set_xlabel("light power [W]")
+    medians = 1e3 * table[["median_a", "median_b"]].to_numpy()
+    if np.nanmax(medians, initial=0.0) > 10.0 * np.nanmin(medians, initial=np.inf):
+        grid[0, 0].set_yscale("log")
+        plain_numbers(grid[0, 0].yaxis)
+    else:
+        grid[0, 0].set_ylim(bottom=0.0)
     grid[0, 0].set_ylabel("median position error [um]\n(numbers above: failed frames)")
     grid[1, 0].set_ylabel(f"{comparison.b} minus {comparison.a} [um]\nmedian, 95 % interval")
     grid[0, -1].legend()
