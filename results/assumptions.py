@@ -17,10 +17,14 @@ from scene.quantity import FROM_FILE, format_quantity
 _NOT_STATED = "not stated"
 _BEAM = TypeAdapter[Any](Beam)
 #: threshold and answer to the two-fold ambiguity, by localizer
+_RCM = "RCM for one spotlight, least spread for several"
+_CODED = "fixed 50 of 255 after median 9"
+_WHOLE = f"{_CODED}, outline cut to whole pixels"
 _LOCALIZERS = {
-    "paper": ("Otsu after Gaussian and median", "candidate that fits the RCM"),
-    "paper-code": ("fixed 50 of 255 after median 9", "candidate that fits the RCM"),
-    "paper-code-oracle": ("fixed 50 of 255 after median 9", "candidate nearest the truth (oracle)"),
+    "paper": ("Otsu after Gaussian and median", _RCM),
+    "paper-code": (_WHOLE, _RCM),
+    "paper-code-float": (_CODED, _RCM),
+    "paper-code-oracle": (_WHOLE, "candidate nearest the truth (oracle)"),
     "cone": ("none (edges below the pixel)", "none (exact cone, RCM as a prior)"),
     "photometric": ("none (likelihood of the pixels)", "none (exact cone, RCM as a prior)"),
 }

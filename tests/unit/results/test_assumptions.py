@@ -19,8 +19,8 @@ def test_the_preset_as_coded(scene):
         edge="Cycles blend 1 (fully soft), half angle 9 deg",
         power_convention="isotropic (I0 = P / 4 pi)",
         transfer="sRGB, 8 bit, white 1 W/m2/sr",
-        threshold="fixed 50 of 255 after median 9",
-        ambiguity="candidate that fits the RCM",
+        threshold="fixed 50 of 255 after median 9, outline cut to whole pixels",
+        ambiguity="RCM for one spotlight, least spread for several",
     )
 
 
