@@ -185,8 +185,11 @@ def _report(options: argparse.Namespace) -> Ending:
     folder: Path = options.folder
     if (folder / "journal.jsonl").exists() and (folder / "campaign.yaml").exists():
         document = read_campaign(str(folder / "campaign.yaml"))
-        with open_store(folder, make_plan(document), document) as store:
-            store.write_rows()
+        plan = make_plan(document)
+        # a run of another version may name its cases otherwise; then its rows are left as they are
+        if plan.campaign.made_with.get("identity") == plan.identity:
+            with open_store(folder, plan, document) as store:
+                store.write_rows()
     _write_results(folder)
     return Ending.DONE
 

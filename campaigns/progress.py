@@ -45,7 +45,7 @@ class Progress:
     def line(self) -> str:
         """Where the run stands."""
         share = self._done / self._frames if self._frames else 1.0
-        failed = f", {self._failed} localizations failed" if self._failed else ""
+        failed = f", {self._failed} not localized" if self._failed else ""
         text = f"{self._done} of {self._frames} frames ({share:.0%}){failed}, {_time(self._clock() - self._start)}"
         remaining = self.remaining()
         known = remaining is not None and self._done < self._frames

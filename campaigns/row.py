@@ -57,39 +57,41 @@ class Record(Model):
         return self
 
 
-def errors(true: Pose, found: Finding, rcm: Vector) -> Row:
-    """Errors of a finding, NaN where it failed.
+def errors(true: Pose, found: Finding | None, rcm: Vector) -> Row:
+    """Errors of a finding, NaN where it failed or there is none.
 
     Tilt and azimuth are the paper's: those of the line from the tip to the remote centre of motion `rcm` [mm], as a
     rotation about Y and about Z, and `rotation_error_deg` is the root of the sum of the squares of their errors.
     `axis_error_deg` is the angle between the true axis and the one that was found.
     """
     row: Row = {f"true_{c}_mm": float(v) for c, v in zip(_XYZ, true.apex, strict=True)}
-    apex = np.array(found.apex if found.apex is not None else (_NAN,) * 3)
-    axis = np.array(found.axis if found.axis is not None else (_NAN,) * 3)
+    apex, axis = (np.array(v or (_NAN,) * 3) for v in ((found.apex, found.axis) if found else (None, None)))
     offset = apex - true.apex
     row |= {f"est_{c}_mm": float(v) for c, v in zip(_XYZ, apex, strict=True)}
     row |= {f"error_{c}_mm": float(v) for c, v in zip(_XYZ, offset, strict=True)}
     row["position_error_mm"] = float(np.linalg.norm(offset))
     tilt = azimuth = _NAN
-    if found.apex is not None and found.apex != tuple(rcm):
+    if found and found.apex and found.apex != tuple(rcm):
         line = Pose.through(apex, rcm)
         tilt = math.degrees(line.tilt - true.tilt)
         azimuth = math.degrees(math.remainder(line.azimuth - true.azimuth, 2.0 * math.pi))
     row |= {"error_rot_y_deg": tilt, "error_rot_z_deg": azimuth, "rotation_error_deg": math.hypot(tilt, azimuth)}
     # from the chord, which keeps its digits where the cosine loses half of them
     chord = float(np.linalg.norm(axis - true.axis))
-    row["axis_error_deg"] = math.degrees(2.0 * math.asin(min(chord / 2.0, 1.0))) if found.axis is not None else _NAN
+    row["axis_error_deg"] = math.degrees(2.0 * math.asin(chord / 2.0 if not chord > 2.0 else 1.0))
     return row
 
 
-def _sigmas(found: Finding | None) -> Row:
-    if found is None or found.covariance is None:
-        return {}
-    variance = [max(found.covariance[i][i], 0.0) for i in range(len(found.covariance))]
-    row: Row = {f"est_sigma_{c}_mm": math.sqrt(variance[i]) for i, c in enumerate(_XYZ)}
-    row["est_sigma_axis_deg"] = math.degrees(math.hypot(math.sqrt(variance[3]), math.sqrt(variance[4])))
-    return row | ({"est_sigma_roll_deg": math.degrees(math.sqrt(variance[5]))} if len(variance) > 5 else {})
+def _sigmas(found: Finding | None, most: int) -> Row:
+    """Standard deviations where there is a covariance, else NaN; no columns at all if the largest, `most`, is 0."""
+    covariance = found.covariance if found is not None else None
+    spread = [_NAN] * most
+    for i, row in enumerate(covariance or ()):
+        spread[i] = math.sqrt(max(row[i], 0.0))
+    named: Row = {f"est_sigma_{c}_mm": sigma for c, sigma in zip(_XYZ, spread, strict=False)}
+    if most > 3:
+        named["est_sigma_axis_deg"] = math.degrees(math.hypot(spread[3], spread[4]))
+    return named | ({"est_sigma_roll_deg": math.degrees(spread[5])} if most > 5 else {})
 
 
 def rows(plan: Plan, records: Mapping[str, Record]) -> Iterator[Row]:
@@ -97,6 +99,7 @@ def rows(plan: Plan, records: Mapping[str, Record]) -> Iterator[Row]:
 
     The order and every value depend on the campaign alone, not on who finished a unit when.
     """
+    most = max((len(f.covariance or ()) for record in records.values() for f in record.findings), default=0)
     homes = {}
     for group in plan.groups:
         first = 0
@@ -112,8 +115,7 @@ def rows(plan: Plan, records: Mapping[str, Record]) -> Iterator[Row]:
                     continue
                 found = record.findings[k] if record.findings else None
                 reason = record.error if found is None else found.reason
-                missing = Finding(case=case.key, localizer=localizer, reason=reason or "lost")
                 row: Row = {"case": case.key, **case.labels, "localizer": localizer, "pose": pose}
                 row |= {"status": "failed" if reason else "ok", "reason": reason}
-                row |= errors(group.pose(pose), found or missing, case.scene.instrument.rcm)
-                yield row | _sigmas(found) | case.swept
+                row |= errors(group.pose(pose), found, case.scene.instrument.rcm)
+                yield row | _sigmas(found, most) | case.swept

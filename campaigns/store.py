@@ -63,20 +63,20 @@ class Store:
 
     def write_rows(self) -> int:
         """Write errors.csv and errors.parquet of what is finished, in the plan's order; their number of rows."""
-        table = list(rows(self.plan, self.records))
-        if not table:
+        if not self.records:
             return 0
         import pandas as pd
 
-        swept = list(self.plan.cases[0].swept)
-        sigmas = sorted({key for row in table for key in row if key.startswith("est_sigma")} - set(swept))
-        standing = [key for key in table[0] if key not in swept and key not in sigmas]
-        frame = pd.DataFrame(table, columns=[*standing, *sigmas, *swept])
-        text = io.StringIO()
+        columns: dict[str, list[str | float]] = {}
+        for row in rows(self.plan, self.records):
+            columns = columns or {name: [] for name in row}
+            for name, value in row.items():
+                columns[name].append(value)
+        frame = pd.DataFrame(columns)
+        text, packed = io.BytesIO(), io.BytesIO()
         frame.to_csv(text, index=False, lineterminator="\n")
-        write_atomically(self.folder / "errors.csv", text.getvalue().encode())
-        packed = io.BytesIO()
         frame.to_parquet(packed, index=False)
+        write_atomically(self.folder / "errors.csv", text.getvalue())
         write_atomically(self.folder / "errors.parquet", packed.getvalue())
         return len(frame)
 
@@ -139,11 +139,10 @@ def _read_journal(path: Path, plan: Plan, journal: IO[bytes]) -> dict[str, Recor
 
     Raises InputError for a line that is no unit of the plan: nothing in the file is believed unchecked.
     """
-    expected = {
-        group.unit(i): [(case.key, name) for case in group.cases for name in case.localizers]
-        for group in plan.groups
-        for i in range(len(group.positions))
-    }
+    expected: dict[str, list[tuple[str, str]]] = {}
+    for group in plan.groups:
+        answers = [(case.key, name) for case in group.cases for name in case.localizers]
+        expected.update((group.unit(i), answers) for i in range(len(group.positions)))
     records: dict[str, Record] = {}
     journal.seek(0)
     number = good = 0

@@ -83,4 +83,4 @@ def test_a_note_is_not_lost_in_the_rewritten_line():
 def test_failed_localizations_are_counted():
     progress = Progress(10, 10.0, io.StringIO(), Clock())
     progress.update(2, 1.0, 3)
-    assert progress.line() == "2 of 10 frames (20%), 3 localizations failed, 0:00"
+    assert progress.line() == "2 of 10 frames (20%), 3 not localized, 0:00"
