@@ -16,7 +16,7 @@ from scene.atomic import write_atomically
 def measure(plan: Plan, store: Store, workers: int) -> Ending:
     """Do what is left, then write the rows of all that is finished; the exit code.
 
-    Units that were lost before are tried again. Raises InputError if the disk refuses, RunError if nothing can run.
+    Units that were lost before are tried again. Raises RunError if the disk refuses or nothing can run.
     """
     left = [u for u in plan.units() if u.key not in store.records or store.records[u.key].error]
     groups = {unit.key: plan.groups[unit.group] for unit in left}

@@ -16,7 +16,7 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import IO
 
-from campaigns.ending import held_back
+from campaigns.ending import RunError, held_back
 from campaigns.plan import Plan
 from campaigns.row import Record, rows
 from campaigns.schema import resolved
@@ -49,7 +49,7 @@ class Store:
         self.records = _read_journal(folder / "journal.jsonl", plan, journal)
 
     def append(self, record: Record) -> None:
-        """Keep a finished unit: it is on the disk when this returns. Raises InputError if the disk refuses."""
+        """Keep a finished unit: it is on the disk when this returns. Raises RunError if the disk refuses."""
         with held_back(signal.SIGINT, signal.SIGTERM):
             try:
                 self._journal.write(record.model_dump_json(exclude_defaults=True).encode() + b"\n")
