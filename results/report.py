@@ -11,6 +11,7 @@ import jinja2
 
 from results.assumptions import assumptions, both_conventions, scene_of
 from results.figures import Drawing
+from results.light_exposure import light_exposures
 from results.published import CITATION
 from results.run import Run
 from results.table import Block, Table, number
@@ -71,7 +72,8 @@ def _facts(run: Run) -> list[tuple[str, str]]:
         values = [str(value) for value in ordered(frame[name])]
         title, unit = ("resolution", " px") if name == "resolution_px" else (name, "")
         facts.append((title, ", ".join(values[:12]) + (" ..." if len(values) > 12 else "") + unit))
-    return facts
+    exposures = light_exposures(run).items()
+    return facts + [(f"retinal exposure, {name}", exposure.sentence) for name, exposure in exposures]
 
 
 def _powers(run: Run) -> Block | None:
