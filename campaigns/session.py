@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import sys
 from pathlib import Path
 
@@ -10,6 +11,7 @@ from campaigns.executor import execute
 from campaigns.plan import Plan
 from campaigns.progress import Progress
 from campaigns.store import Store, made_with
+from scene import InputError
 from scene.atomic import write_atomically
 
 
@@ -37,9 +39,14 @@ def measure(plan: Plan, store: Store, workers: int) -> Ending:
             progress.update(len(group.cases), group.work, sum(bool(f.reason) for f in record.findings))
     except KeyboardInterrupt:
         interrupted = True
+    except BaseException:
+        # what ended the run is what to say, not that its rows cannot be written either
+        with contextlib.suppress(InputError):
+            store.write_rows()
+        raise
     finally:
         crew.close()
-        store.write_rows()
+    store.write_rows()
     progress.close()
     lost = [record for record in store.records.values() if record.error]
     if interrupted:

@@ -51,14 +51,14 @@ class Store:
     def append(self, record: Record) -> None:
         """Keep a finished unit: it is on the disk when this returns. Raises RunError if the disk refuses."""
         with held_back(signal.SIGINT, signal.SIGTERM):
+            line = record.model_dump_json(exclude_defaults=True).encode() + b"\n"
             try:
-                self._journal.write(record.model_dump_json(exclude_defaults=True).encode() + b"\n")
-                self._journal.flush()
+                while line:  # not through a buffer, which would try again when it is closed
+                    line = line[os.write(self._journal.fileno(), line) :]
                 os.fsync(self._journal.fileno())
             except OSError as error:
-                raise InputError(
-                    f"{self.folder}: cannot be written: {error.strerror}; finished poses are kept"
-                ) from None
+                reason = f"{self.folder}: cannot be written: {error.strerror}"
+                raise RunError(f"{reason}; what is finished is kept, and the same command continues the run") from None
             self.records[record.unit] = record
 
     def write_rows(self) -> int:

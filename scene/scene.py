@@ -91,7 +91,9 @@ def expand(document: Document, at: tuple[str | int, ...]) -> Document:
         data = {"preset": data}
     if not isinstance(data, dict) or "preset" not in data:
         return document
-    preset = read_document(find_document(str(data["preset"]), "scene", "presets", "scene preset"))
+    name = str(data["preset"])
+    beside = document.folder / name
+    preset = read_document(beside if beside.is_file() else find_document(name, "scene", "presets", "scene preset"))
     full = merge(preset.data, {k: v for k, v in data.items() if k != "preset"})
     for key in reversed(at):
         full = {str(key): full}

@@ -68,6 +68,11 @@ def test_swept_presets_keep_what_the_campaign_changes_in_them(campaign):
     assert [(c.scene.eye.radius, c.scene.camera.resolution) for c in cases(document)] == [(12.0, 300), (12.5, 300)]
 
 
+def test_a_preset_may_be_a_file_beside_the_campaign(campaign, tmp_path):
+    (tmp_path / "mine.yaml").write_text("eye: {radius: 11 mm}\n")
+    assert cases(campaign("scene: {preset: mine.yaml}\n"))[0].scene.eye.radius == 11.0
+
+
 def test_a_swept_mapping_is_laid_on_the_preset(campaign):
     document = campaign("scene: paper\nsweep: {scene.beam: [{half_angle: 8 deg}, {kind: hard, half_angle: 9 deg}]}\n")
     assert [(c.scene.beam.kind, round(c.scene.beam.half_angle, 3)) for c in cases(document)] == [

@@ -1,8 +1,11 @@
 """campaigns.store: a run folder survives torn writes, strangers and second writers."""
 
+import errno
+
 import pandas as pd
 import pytest
 
+from campaigns.ending import RunError
 from campaigns.plan import make_plan
 from campaigns.row import Finding, Record
 from campaigns.schema import read_campaign
@@ -147,6 +150,21 @@ def test_a_later_record_of_a_unit_replaces_the_error_before_it(plan, document, r
     assert set(pd.read_csv(run / "errors.csv")["reason"]) == {"out of memory"}
     fill(plan, document, run, [unit])
     assert "out of memory" not in set(pd.read_csv(run / "errors.csv")["reason"])
+
+
+def test_a_full_disk_keeps_what_is_finished(plan, document, run, monkeypatch):
+    units = list(plan.units())
+
+    def full(handle):
+        raise OSError(errno.ENOSPC, "No space left on device")
+
+    with open_store(run, plan, document) as store:
+        store.append(record(plan, units[0]))
+        monkeypatch.setattr("os.fsync", full)
+        with pytest.raises(RunError, match="cannot be written: No space left on device; what is finished is kept"):
+            store.append(record(plan, units[1]))
+        monkeypatch.undo()
+        assert set(store.records) == {units[0].key}
 
 
 def test_another_campaigns_folder_is_refused_and_left_alone(tmp_path, plan, document, run):
