@@ -212,6 +212,6 @@ def dump(content: BaseModel | dict[str, Any]) -> str:
     yaml = YAML(typ="safe", pure=True)
     yaml.default_flow_style = None
     yaml.width = 110
-    yaml.sort_base_mapping_type_on_output = False
+    yaml.sort_base_mapping_type_on_output = False  # type: ignore[assignment]
     yaml.dump(content.model_dump(mode="json") if isinstance(content, BaseModel) else content, stream)
     return stream.getvalue()
