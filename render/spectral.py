@@ -62,7 +62,7 @@ def emission(scene: Scene, light: Light, total: float, water_mm: float) -> dict[
 
     In a living eye `water_mm` of vitreous between the light and the retina absorb some.
     """
-    if not has_water(scene):
+    if not has_water(scene) or total == 0.0:  # Mitsuba takes no table of zeros
         return {"type": "uniform", "value": total}
     values = _written(emitted(light, total, water_mm))
     low, high = light.spectrum.low, light.spectrum.high

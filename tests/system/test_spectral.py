@@ -162,6 +162,12 @@ def test_infrared_light_and_white_ambient_keep_to_themselves():
     assert renderer.tile(scene.pose(np.array([0.0, 0.0, 5.0])), 0, seed=1).radiance.max() > 0.0
 
 
+def test_no_ambient_light_is_black():
+    """A living eye without ambient light; against a background of exactly 0."""
+    scene = Scene(camera=Camera(resolution=32), retina=FundusSite(), ambient=Ambient(irradiance=0.0))
+    assert Renderer(scene).background().max() == 0.0
+
+
 def test_vitreous_takes_its_share_on_both_ways():
     """Patch at 970 nm with and without water; against 24 mm out and the tip's 5 mm in, from the table; within 1 %."""
     pose_at = np.array([0.0, 0.0, 5.0])
