@@ -4,10 +4,12 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+import cv2
 import numpy as np
 from numpy.typing import NDArray
 
 from localize.albedo import FUNDUS_AMPLITUDE, Eliminated, Modes, eliminate
+from localize.band import SETTLED_SIGMAS
 from localize.noise import NoiseModel
 from localize.prior import Estimate, Knowns, prior_rows
 from localize.solve import spread, student_weights
@@ -17,7 +19,7 @@ Array = NDArray[np.float64]
 _WHITE = 0.1  # of the albedo beyond the modes, before it has been measured
 _LEAST_WHITE = 1e-3
 _LONGEST_STEP_MM = 0.15
-_SETTLED_MM = 2e-5
+_DONE_SIGMAS = 0.05
 
 
 @dataclass(frozen=True)
@@ -39,6 +41,7 @@ class FieldFit:
     misfit: float  #: rms of the lit bins' residuals, outliers cut, over what the model expects
     settled: bool  #: whether the last step was small
     lit_share: float  #: share of the predicted patch that the frame shows and that is not clipped
+    correlation: float  #: how much larger the residuals' means over blocks are than independent bins would give
 
 
 def fit_field(
@@ -52,7 +55,7 @@ def fit_field(
     modes: int,
     iterations: int,
     tied: int = 0,
-    reference: Array | None = None,
+    reference: NDArray[np.generic] | None = None,
     frames: float = 1.0,
     margin: float = 0.3,
 ) -> FieldFit | None:
@@ -75,7 +78,7 @@ def fit_field(
         first = Field(amplitude=1e-5 if reference is not None else FUNDUS_AMPLITUDE)
         fields = tuple(first for _ in planes)
     coefficients = [np.zeros(len(basis.spectrum)) for _ in planes]
-    information, misfit, settled = np.zeros((size, size)), 0.0, False
+    information, misfit, settled, correlation = np.zeros((size, size)), 0.0, False, 1.0
     for count in range(iterations):
         light, rows = grid.spotlight(estimate, roll=roll)
         exact = Knowns(rcm_sigma_mm=2e-3, half_angle_sigma_deg=knowns.half_angle_sigma_deg,
@@ -107,12 +110,14 @@ def fit_field(
             for field, gain, part in zip(updated, steps, parts, strict=True)
         )
         misfit = float(np.sqrt(np.mean(np.square(misfits))))
-        settled = float(np.max(np.abs(step[:3]))) < max(_SETTLED_MM, 0.02 / np.sqrt(np.max(np.diag(information)[:3])))
-        if settled and count >= max(tied, 2):
+        correlation = float(np.mean([part.correlation for part in parts]))
+        length = float(np.sqrt(max(0.0, float(step @ information @ step))))
+        settled = length < SETTLED_SIGMAS
+        if length < _DONE_SIGMAS and count >= max(tied, 2):
             break
     inside = grid.lit[light > 0.0]
     share = float(np.mean([np.count_nonzero(p.usable.ravel()[inside]) / max(1, len(inside)) for p in planes]))
-    return FieldFit(estimate, fields, information, misfit, settled, share)
+    return FieldFit(estimate, fields, information, misfit, settled, share, correlation)
 
 
 class _Term:
@@ -170,6 +175,7 @@ class _Term:
         if not fresh:
             weights = weights * student_weights(whitened)
         self.misfit = float(np.sqrt(np.mean(np.minimum(np.square(whitened[use]), 25.0)))) if use.any() else np.inf
+        self.correlation = _correlation((whitened * inner).reshape(shape), inner.reshape(shape))
         jacobian = np.zeros((len(rows) + 1, signal.size))
         share = gain / brightness[lit]
         jacobian[:-1, lit] = share * rows
@@ -197,6 +203,17 @@ class _Term:
         c = self._solved.coefficients(np.append(step, gain))
         self.amplitude = self._basis.learnt_amplitude(c, self._solved.variances, self.amplitude)
         return c
+
+
+def _correlation(residuals: Array, inner: NDArray[np.bool_], block: int = 7) -> float:
+    """Variance of means over blocks of whitened residuals, times the block's size, over the bins' own variance."""
+    full = np.clip(residuals, -4.0, 4.0)
+    share = cv2.blur(inner.astype(float), (block, block))
+    means = cv2.blur(full, (block, block))[share > 0.99]
+    if len(means) < 2 * block**2:
+        return 1.0
+    single = float(np.var(full[inner]))
+    return float(np.clip(block**2 * np.var(means) / max(single, 1e-12), 1.0, 30.0))
 
 
 def _base(signal: Array, ambient: Array, dark: NDArray[np.bool_]) -> float:

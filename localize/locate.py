@@ -7,8 +7,12 @@ from collections.abc import Callable
 
 from numpy.typing import ArrayLike
 
+from localize.cone import cone
 from localize.image import AnyImage, checked
+from localize.noise import NoiseModel
 from localize.outcome import Outcome
+from localize.photometric import photometric
+from localize.prior import Knowns
 from localize.published import paper, paper_code, paper_code_float, paper_code_oracle
 from scene import InputError, Pose, Scene
 
@@ -21,15 +25,32 @@ LOCALIZERS: dict[str, Localizer] = {
     "paper-code": paper_code,
     "paper-code-float": paper_code_float,
     "paper-code-oracle": paper_code_oracle,
+    "cone": lambda image, scene, oracle: cone(image, scene),
+    "photometric": lambda image, scene, oracle: photometric(image, scene),
 }
+#: localizers that use what is known beside the image
+ESTIMATORS: dict[str, Callable[..., Outcome]] = {"cone": cone, "photometric": photometric}
 
 
-def locate(image: ArrayLike, scene: Scene, localizer: str = "paper", *, oracle: Pose | None = None) -> Outcome:
+def locate(
+    image: ArrayLike,
+    scene: Scene,
+    localizer: str = "paper",
+    *,
+    oracle: Pose | None = None,
+    knowns: Knowns | None = None,
+    reference: ArrayLike | None = None,
+    noise: NoiseModel | None = None,
+) -> Outcome:
     """Where the instrument is, from one image of its spotlights' patches.
 
     `image` is `[H, W]` grey or `[H, W, 3]` RGB with the resolution of `scene.camera`: uint8 (255 is white), uint16
     (`scene.sensor.full_scale` is white) or float (1.0 is white). `oracle` is the true pose, needed by the localizers
     whose name ends in "-oracle" and refused by all others.
+
+    `cone` and `photometric` take more: `knowns` says how well RCM, half angle, eye and camera are known (default: the
+    RCM to 0.05 mm, all else exactly), `reference` is a frame without spotlights, shaped like the image, and `noise`
+    the sensor's noise where it is not the scene's. They answer with a covariance.
 
     Returns a Localization (`apex_mm [3]`, unit `axis [3]` from the RCM into the light), or a LocalizationFailure,
     which is falsy and has a `reason`. Raises InputError for an unknown localizer, an image that cannot be read or
@@ -43,4 +64,12 @@ def locate(image: ArrayLike, scene: Scene, localizer: str = "paper", *, oracle: 
         raise InputError(f"localizer '{localizer}' chooses by the true pose; give it as oracle=")
     if not localizer.endswith("-oracle") and oracle is not None:
         raise InputError(f"localizer '{localizer}' must not see the true pose; leave oracle= out")
+    if localizer in ESTIMATORS:
+        dark = None if reference is None else checked(reference, scene)
+        return ESTIMATORS[localizer](checked(image, scene), scene, knowns=knowns, reference=dark, noise=noise)
+    for name, given in {"knowns": knowns, "reference": reference, "noise": noise}.items():
+        if given is not None:
+            raise InputError(
+                f"localizer '{localizer}' has no use for {name}=; leave it out, or take one of {', '.join(ESTIMATORS)}"
+            )
     return LOCALIZERS[localizer](checked(image, scene), scene, oracle)

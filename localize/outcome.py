@@ -26,13 +26,15 @@ class Localization:
     `apex_mm` is the tip `[3]` [mm] and `axis` the needle's unit axis into the light `[3]`. `covariance`, where the
     localizer knows it, is `[5, 5]` over the apex [mm] and the axis's components [rad] along the first two columns
     of `Pose.rotation()`, or `[6, 6]` with the roll [rad] behind them. `spread_mm` is the root mean square distance
-    of several spotlights' positions from their mean, None where there was one estimate.
+    of several spotlights' positions from their mean, None where there was one estimate. `roll` [rad] is as in `Pose`,
+    None for localizers that do not measure it.
     """
 
     apex_mm: Array
     axis: Array
     covariance: Array | None = None
     spread_mm: float | None = None
+    roll: float | None = None
 
 
 @dataclass(frozen=True)

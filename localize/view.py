@@ -8,7 +8,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from localize.forward import Sight, ambient_irradiance, light, look, window
+from localize.forward import Sight, ambient_irradiance, light, light_by_surface, look, window
 from localize.noise import NoiseModel, linear_light
 from localize.prior import Estimate, Knowns, value, with_value
 from scene.scene import Scene
@@ -78,17 +78,22 @@ class Channel:
 
 
 def channels(
-    image: NDArray[np.generic], scene: Scene, at: Window, reference: Array | None, noise: NoiseModel, frames: float
+    image: NDArray[np.generic],
+    scene: Scene,
+    at: Window,
+    reference: NDArray[np.generic] | None,
+    noise: NoiseModel,
+    frames: float,
 ) -> list[Channel]:
     """The channels of an image `[H, W]` or `[H, W, 3]` in a window.
 
-    `reference` is the same view in ambient light alone, a mean over `frames` frames [white], `[H, W]` or `[H, W, 3]`.
+    `reference` is the same view in ambient light alone, a mean over `frames` frames, in pixel values of the image.
     """
     light_, clip = linear_light(np.ascontiguousarray(at.cut(image)), scene)
     signal = light_[..., None] if light_.ndim == 2 else light_
     clip = clip[..., None] if clip.ndim == 2 else clip
     found = []
-    irradiance = None
+    irradiance: Array | None = None
     for c in range(signal.shape[2]):
         share = at.binned(clip[..., c].astype(np.float32)) if clip[..., c].any() else np.zeros((at.height, at.width))
         template, spread = np.zeros((at.height, at.width)), np.zeros((at.height, at.width))
@@ -96,7 +101,7 @@ def channels(
             if irradiance is None:
                 sight = look(scene, window(at.row, at.column, at.height, at.width, at.side), at.side)
                 irradiance = ambient_irradiance(sight, scene).reshape(at.height, at.width)
-            cut = at.cut(reference)
+            cut = linear_light(np.ascontiguousarray(at.cut(reference)), scene)[0]
             plane = at.binned(np.ascontiguousarray(cut if cut.ndim == 2 else cut[..., c], dtype=np.float32))
             template, spread = _log_albedo(plane, irradiance, noise, frames * at.side**2)
         found.append(
@@ -111,7 +116,7 @@ def _log_albedo(plane: Array, irradiance: Array, noise: NoiseModel, samples: flo
     variance = float(noise.variance(np.array(level))) / samples / level**2
     width = float(np.clip(0.5 * (variance / 1e-4) ** 0.25, 0.0, 2.5))
     if width > 0.3:
-        plane = cv2.GaussianBlur(plane, (0, 0), width)
+        plane = np.asarray(cv2.GaussianBlur(plane, (0, 0), width), float)
         variance /= max(1.0, 4.0 * np.pi * width**2)
     plane = np.maximum(plane, 0.1 * level)
     return np.log(plane / np.maximum(irradiance, 1e-3)), variance * (level / plane) ** 2
@@ -152,11 +157,11 @@ class Grid:
             if name == "half_angle":
                 rows.append(here.jacobian[-1:])
                 continue
-            sides = []
-            for step in (_STEP, -_STEP):
-                other = with_value(estimate.scene, name, value(estimate.scene, name) + step)
-                sides.append(light(self._look(other), estimate.pose, other, profile).value)
-            rows.append(((sides[0] - sides[1]) / (2.0 * _STEP))[None])
+            plus, minus = (
+                self._look(with_value(estimate.scene, name, value(estimate.scene, name) + step))
+                for step in (_STEP, -_STEP)
+            )
+            rows.append(light_by_surface(here, sight, estimate.pose, (plus, minus), _STEP)[None])
         return here.value, np.concatenate(rows)
 
     def _look(self, scene: Scene) -> Sight:

@@ -1,0 +1,81 @@
+"""`photometric`: maximum likelihood on pixels, with the beam's profile, inverse square, cosine and the sensor's noise.
+
+The albedo is a nuisance: a Gaussian field where the whole patch can be measured, a level and a slope across each strip
+of its rim where only that says where the cone is (a hard edge, or a clipped patch). A reference frame without
+spotlights, or a sequence over the same retina, takes its place as far as it is known.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from localize.cone import fit_edge, is_clipped, is_sharp
+from localize.field import Field, FieldFit, fit_field
+from localize.noise import NoiseModel, noise_of
+from localize.outcome import LocalizationFailure, Outcome
+from localize.prior import Estimate, Knowns
+from localize.start import Start, find_start
+from localize.verdict import COVERED, UNCERTAIN, judged
+from scene.scene import Scene
+
+#: bins across the patch, modes a side, iterations, of which tied to the RCM
+_LEVELS = ((64, 10, 7, 3), (130, 16, 8, 0))
+
+
+def photometric(
+    image: NDArray[np.generic],
+    scene: Scene,
+    *,
+    knowns: Knowns | None = None,
+    reference: NDArray[np.generic] | None = None,
+    frames: float = 1.0,
+    noise: NoiseModel | None = None,
+) -> Outcome:
+    """The tip from a checked image `[H, W]` or `[H, W, 3]`.
+
+    `reference` is the same view in ambient light alone, averaged over `frames` frames; in the image's own pixel values.
+    """
+    known, sensor = knowns or Knowns(), noise or noise_of(scene)
+    start = find_start(image, scene, reference)
+    if isinstance(start, str):
+        return LocalizationFailure(start)
+    if is_sharp(scene) or is_clipped(image, scene, start):
+        edge = fit_edge(image, scene, start, known, sensor)
+        if isinstance(edge, str):
+            return LocalizationFailure(edge)
+        return judged(
+            edge.estimate, edge.information, edge.correlation, scene, known,
+            misfit=edge.misfit, covered=edge.covered, settled=edge.settled,
+        )  # fmt: skip
+    fit = fit_patch(image, scene, start, known, sensor, reference, frames)
+    if isinstance(fit, str):
+        return LocalizationFailure(fit)
+    return judged(
+        fit.estimate, fit.information, fit.correlation, scene, known,
+        misfit=fit.misfit, covered=fit.lit_share, settled=fit.settled,
+    )  # fmt: skip
+
+
+def fit_patch(
+    image: NDArray[np.generic],
+    scene: Scene,
+    start: Start,
+    knowns: Knowns,
+    noise: NoiseModel,
+    reference: NDArray[np.generic] | None,
+    frames: float,
+) -> FieldFit | str:
+    """The field fit, coarse to fine, or why there is none."""
+    estimate, fields = Estimate.at(start.pose, scene), tuple[Field, ...]()
+    fit: FieldFit | None = None
+    for number, (bins, modes, iterations, tied) in enumerate(_LEVELS):
+        fit = fit_field(
+            image, estimate, fields, knowns, noise,
+            bins=bins, modes=modes, iterations=iterations, tied=tied, reference=reference, frames=frames,
+        )  # fmt: skip
+        if fit is None:
+            return UNCERTAIN if number else COVERED
+        estimate, fields = fit.estimate, fit.fields
+    assert fit is not None
+    return fit

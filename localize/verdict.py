@@ -1,0 +1,82 @@
+"""Whether a fit may be believed: a result that contradicts the model is refused with the reason, never returned."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from localize.outcome import Localization, LocalizationFailure, Outcome
+from localize.prior import Estimate, Knowns, rcm_miss
+from scene.scene import Scene
+
+Array = NDArray[np.float64]
+UNCERTAIN = "too uncertain: the patch and what is known do not hold the tip within the limit"
+MISSES_RCM = "the axis misses the remote centre of motion by more than both their errors allow"
+MISFIT = "the light in the patch contradicts the model of the beam"
+OUTSIDE = "the fitted tip is outside the eye"
+COVERED = "too little of the patch is in the frame"
+UNSETTLED = "the fit does not settle"
+#: largest sigma of the tip that is returned [mm]
+LARGEST_SIGMA_MM = 0.06
+_LARGEST_MISFIT = 2.5
+_LEAST_COVERED = 0.35
+_MISS_SIGMAS = 5.0
+#: what no fit on real optics resolves, added to every tip and axis
+_FLOOR_MM, _FLOOR_RAD = 2e-5, 2e-6
+
+
+def judged(
+    estimate: Estimate,
+    information: Array,
+    inflation: float,
+    nominal: Scene,
+    knowns: Knowns,
+    *,
+    misfit: float,
+    covered: float,
+    settled: bool,
+) -> Outcome:
+    """The localization, or why there is none.
+
+    `information` `[P, P]` is of the pose and the free quantities with priors; `inflation` is by how much correlated
+    residuals make its data worth less. `misfit` is the rms residual over the model's, `covered` the share seen.
+    """
+    if covered < _LEAST_COVERED:
+        return LocalizationFailure(COVERED)
+    if nominal.depth(estimate.pose.apex) <= 0.0:
+        return LocalizationFailure(OUTSIDE)
+    size = 6 if len(nominal.spotlights) > 1 else 5
+    covariance = _inverse(information)
+    if covariance is None:
+        return LocalizationFailure(UNCERTAIN)
+    pose = covariance[:size, :size] * inflation
+    pose[np.arange(3), np.arange(3)] += _FLOOR_MM**2
+    pose[np.arange(3, size), np.arange(3, size)] += _FLOOR_RAD**2
+    sigma = math.sqrt(float(np.trace(pose[:3, :3])))
+    if not math.isfinite(sigma) or sigma > LARGEST_SIGMA_MM:
+        return LocalizationFailure(UNCERTAIN)
+    if knowns.rcm_sigma_mm is not None:
+        reach = float(np.linalg.norm(np.asarray(nominal.instrument.rcm) - estimate.pose.apex))
+        spread = math.hypot(knowns.rcm_sigma_mm, reach * math.sqrt(float(np.max(np.diag(pose)[3:5]))))
+        if float(np.linalg.norm(rcm_miss(estimate.pose, nominal))) > _MISS_SIGMAS * spread + 1e-5:
+            return LocalizationFailure(MISSES_RCM)
+    if misfit > _LARGEST_MISFIT:
+        return LocalizationFailure(MISFIT)
+    if not settled:
+        return LocalizationFailure(UNSETTLED)
+    if size == 6:
+        # a pose's roll turns about the needle's back end, the fit's about the axis into the light
+        pose[5, :5] *= -1.0
+        pose[:5, 5] *= -1.0
+        return Localization(estimate.pose.apex, estimate.pose.axis, pose, roll=estimate.pose.roll)
+    return Localization(estimate.pose.apex, estimate.pose.axis, pose)
+
+
+def _inverse(information: Array) -> Array | None:
+    scale = np.sqrt(np.maximum(np.diag(information), 1e-300))
+    try:
+        return np.asarray(np.linalg.inv(information / np.outer(scale, scale)) / np.outer(scale, scale))
+    except np.linalg.LinAlgError:
+        return None

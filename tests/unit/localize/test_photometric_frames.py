@@ -1,0 +1,219 @@
+"""The estimators on frames cast ray by ray with scene's geometry only: texture, ambient light, a noisy sensor."""
+
+import math
+from functools import lru_cache
+
+import cv2
+import numpy as np
+import pytest
+
+from localize import Knowns, Localization, SensorNoise, locate
+from localize.calibration import calibrate
+from localize.sequence import locate_sequence
+from localize.theory import cramer_rao
+from scene import InputError, Pose
+from scene.beam import CyclesBeam, HardBeam
+from scene.camera import Camera
+from scene.scene import Scene
+from scene.sensor import Linear
+from scene.spotlights import spotlight_axes
+
+PEAK, AMBIENT, READ = 9000.0, 200.0, 15.0
+WHITE = 1.25 * PEAK
+NOISE = SensorNoise(levels=4095, electrons=WHITE, read=READ)
+
+
+def scene_of(beam, spotlights="single", resolution=1000, **more):
+    return Scene(beam=beam, spotlights=spotlights, camera=Camera(resolution=resolution), sensor=Linear(bits=12), **more)
+
+
+@lru_cache
+def fundus(contrast, seed=1):
+    """A log albedo with a fundus' spectrum, as a map over 14 x 14 mm; rms `contrast`."""
+    rng = np.random.default_rng(seed)
+    n = 1400
+    k = np.hypot(np.fft.fftfreq(n, 0.01)[:, None], np.fft.rfftfreq(n, 0.01))
+    k[0, 0] = np.inf
+    field = np.fft.irfft2(np.fft.rfft2(rng.standard_normal((n, n))) * k**-1.3 / (1.0 + (k / 8.0) ** 2), (n, n))
+    return np.exp(contrast * field / field.std()).astype(np.float32)
+
+
+def albedo(texture, points):
+    if texture is None:
+        return np.ones(points.shape[:-1])
+    u = (points[..., 0] / 0.01 + 700.0).astype(np.float32)
+    v = (700.0 - points[..., 1] / 0.01).astype(np.float32)
+    return cv2.remap(texture, u, v, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)
+
+
+def cast(scene, x, y):
+    rays = scene.camera.back_project(np.stack(np.meshgrid(x, y), axis=-1))
+    return scene.surface.intersect(scene.eye, scene.camera.centre, rays)
+
+
+def spotlight(scene, pose, points):
+    outward = points - scene.eye.centre
+    normals = scene.surface.normals(scene.eye, outward / np.linalg.norm(outward, axis=-1, keepdims=True))
+    to = points - pose.apex
+    d = np.linalg.norm(to, axis=-1)
+    profile = sum(scene.beam.intensity(to @ axis / d) for axis in spotlight_axes(pose, scene.spotlights))
+    return profile * -np.sum(normals * to, axis=-1) / d**3
+
+
+def photograph(scene, pose, texture=None, seed=0, rays=None, noise=True):
+    """A 12-bit frame: 9000 e- where the patch is brightest, 200 e- of ambient light, 15 e- of read noise."""
+    rng = np.random.default_rng(seed)
+    side = scene.camera.resolution
+    k = rays or (16 if isinstance(scene.beam, HardBeam) else 4)
+    centres = np.arange(side) + 0.5
+    plain = scene.model_copy(update={"surface": Scene().surface})
+    electrons = AMBIENT * albedo(texture, cast(plain, centres, centres)).astype(float)
+    outlines = [scene.camera.project(scene.outline(pose, i)) for i in range(len(scene.spotlights))]
+    every = np.concatenate(outlines)
+    low = np.floor(np.nanmin(every, axis=0)).astype(int).clip(2) - 2
+    high = np.ceil(np.nanmax(every, axis=0)).astype(int).clip(0, side - 2) + 2
+    patch = []
+    for row in range(low[1], high[1]):
+        x = low[0] + (np.arange((high[0] - low[0]) * k) + 0.5) / k
+        points = cast(scene, x, row + (np.arange(k) + 0.5) / k)
+        a = albedo(texture, points)
+        both = np.stack([a, a * spotlight(scene, pose, points)])
+        patch.append(both.reshape(2, k, -1, k).mean(axis=(1, 3)))
+    ambient, light = np.stack(patch, axis=1)
+    region = electrons[low[1] : high[1], low[0] : high[0]]
+    region[:] = AMBIENT * ambient + PEAK * light / np.quantile(light, 0.998)
+    if noise:
+        electrons = rng.poisson(electrons) + READ * rng.standard_normal(electrons.shape)
+    return np.clip(np.round(electrons / WHITE * 4095.0), 0, 4095).astype(np.uint16)
+
+
+FREE = Knowns(rcm_sigma_mm=None)
+TIPS = ((1.0, 0.5, 4.0), (-1.5, -1.0, 3.0))
+
+
+def miss_um(outcome, pose):
+    assert isinstance(outcome, Localization), getattr(outcome, "reason", outcome)
+    return 1e3 * float(np.linalg.norm(outcome.apex_mm - pose.apex))
+
+
+def sigmas_off(outcome, pose):
+    error = outcome.apex_mm - pose.apex
+    return math.sqrt(float(error @ np.linalg.solve(outcome.covariance[:3, :3], error)))
+
+
+@pytest.mark.parametrize("tip", TIPS)
+def test_a_hard_patch_without_texture_is_found_near_the_bound(tip):
+    scene = scene_of(HardBeam())
+    pose = scene.pose(np.array(tip))
+    found = locate(photograph(scene, pose), scene, "cone", knowns=FREE, noise=NOISE)
+    bound = cramer_rao(scene, pose).position_mm * 1e3
+    assert miss_um(found, pose) < 3.5 * bound
+    assert sigmas_off(found, pose) < 4.0
+
+
+def test_the_mean_over_noise_of_a_hard_patch_is_unbiased_below_a_fiftieth_of_a_pixel():
+    scene = scene_of(HardBeam())
+    pose = scene.pose(np.array(TIPS[0]))
+    found = locate(photograph(scene, pose, noise=False, rays=32), scene, "cone", knowns=FREE, noise=NOISE)
+    outline, true = (scene.camera.project(scene.outline(p, 0)) for p in (scene_pose(found), pose))
+    assert np.max(np.abs(outline - true)) < 0.02
+
+
+def scene_pose(found):
+    return Pose(found.apex_mm, found.axis)
+
+
+@pytest.mark.parametrize("tip", TIPS)
+def test_a_hard_patch_on_texture_is_found_to_microns(tip):
+    scene = scene_of(HardBeam())
+    pose = scene.pose(np.array(tip))
+    found = locate(photograph(scene, pose, fundus(0.2)), scene, "cone", knowns=FREE, noise=NOISE)
+    assert miss_um(found, pose) < 7.0
+    assert sigmas_off(found, pose) < 4.5
+
+
+@pytest.mark.parametrize("tip", TIPS)
+def test_a_soft_patch_on_texture_is_found_when_the_rcm_is_known(tip):
+    scene = scene_of(CyclesBeam())
+    pose = scene.pose(np.array(tip))
+    found = locate(photograph(scene, pose, fundus(0.2)), scene, "photometric", knowns=Knowns(0.01), noise=NOISE)
+    assert miss_um(found, pose) < 15.0
+    assert sigmas_off(found, pose) < 4.5
+
+
+def test_a_reference_frame_makes_a_soft_patch_on_texture_sharper():
+    scene = scene_of(CyclesBeam())
+    pose, texture = scene.pose(np.array(TIPS[0])), fundus(0.2)
+    far = scene.pose(np.array([-2.5, 2.5, 3.0]))
+    lit = photograph(scene, pose, texture)
+    reference = photograph(scene, far, texture, seed=1)
+    found = locate(lit, scene, "photometric", knowns=Knowns(0.01), noise=NOISE, reference=reference)
+    alone = locate(lit, scene, "photometric", knowns=Knowns(0.01), noise=NOISE)
+    assert miss_um(found, pose) < 6.0
+    assert np.trace(found.covariance[:3, :3]) < np.trace(alone.covariance[:3, :3])
+
+
+def test_three_patches_give_the_tip_and_the_roll():
+    scene = scene_of(HardBeam(), "triple")
+    pose = scene.pose(np.array(TIPS[0]))
+    found = locate(photograph(scene, pose, fundus(0.2), rays=8), scene, "cone", knowns=FREE, noise=NOISE)
+    assert miss_um(found, pose) < 3.0
+    assert math.degrees(abs(found.roll)) < 0.05
+    assert found.covariance.shape == (6, 6)
+
+
+def test_a_wrong_rcm_is_refused_or_inside_the_stated_uncertainty():
+    scene = scene_of(HardBeam())
+    pose = scene.pose(np.array(TIPS[0]))
+    wrong = scene.model_copy(update={"instrument": scene.instrument.model_copy(update={"rcm": (6.5, 0.0, 22.0)})})
+    found = locate(photograph(scene, pose), wrong, "cone", knowns=Knowns(0.01), noise=NOISE)
+    assert not found
+    assert "remote centre of motion" in found.reason
+
+
+def test_free_soft_patches_on_texture_are_never_returned_far_off():
+    scene = scene_of(CyclesBeam())
+    for seed, tip in enumerate(TIPS):
+        pose = scene.pose(np.array(tip))
+        lit = photograph(scene, pose, fundus(0.4, seed))
+        found = locate(lit, scene, "photometric", knowns=FREE, noise=NOISE)
+        if found:
+            sigma = math.sqrt(float(np.trace(found.covariance[:3, :3])))
+            assert miss_um(found, pose) < 6e3 * sigma + 50.0
+
+
+@pytest.mark.parametrize("localizer", ["cone", "photometric"])
+def test_a_frame_without_a_patch_is_a_failure_with_a_reason(localizer):
+    scene = scene_of(HardBeam(), resolution=200)
+    empty = np.random.default_rng(0).normal(80.0, 6.0, (200, 200)).astype(np.uint16)
+    assert locate(empty, scene, localizer).reason
+
+
+def test_a_sequence_learns_the_retina_that_single_frames_cannot_see():
+    scene = scene_of(CyclesBeam())
+    texture = fundus(0.2)
+    poses = [scene.pose(np.array([2.0 * math.sin(t), 2.0 * math.cos(t), 3.5])) for t in np.linspace(0.0, 5.5, 6)]
+    frames = [photograph(scene, pose, texture, seed=i, rays=2) for i, pose in enumerate(poses)]
+    result = locate_sequence(lambda: frames, scene, knowns=Knowns(0.01), noise=NOISE)
+    assert result.learnt_from == 6
+    assert np.mean([miss_um(o, p) for o, p in zip(result.outcomes, poses, strict=True)]) < 4.0
+
+
+def test_calibration_finds_the_half_angle_of_a_rig_and_says_that_the_size_of_the_scene_is_hidden():
+    true = scene_of(HardBeam(half_angle=math.radians(9.03)), "triple")
+    believed = scene_of(HardBeam(), "triple")
+    poses = [true.pose(np.array([1.5 * math.sin(t), 1.5 * math.cos(t), 3.0 + 0.3 * t])) for t in range(4)]
+    frames = [photograph(true, pose, seed=i, rays=6) for i, pose in enumerate(poses)]
+    found = calibrate(lambda: frames, believed, noise=NOISE)
+    assert math.degrees(found.values[0]) == pytest.approx(9.03, abs=2e-3)
+    assert found.observable["half_angle"]
+    assert not found.observable["camera_height"]
+    assert "camera_height: not observable" in found.statement()
+
+
+def test_knowns_refuse_nonsense_and_published_methods_refuse_knowns():
+    with pytest.raises(InputError, match="rcm_sigma_mm"):
+        Knowns(rcm_sigma_mm=-1.0)
+    scene = scene_of(HardBeam(), resolution=100)
+    with pytest.raises(InputError, match="no use for knowns"):
+        locate(np.zeros((100, 100), np.uint8), scene, "paper", knowns=FREE)
