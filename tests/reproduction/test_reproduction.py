@@ -50,10 +50,10 @@ def mean_errors(folder, **where):
 
 def test_table_1_is_the_papers_to_two_hundredths_of_a_micrometre(small):
     table = pd.read_csv(small / "tables" / "table_1.csv")
-    ours = table.set_index("half_angle_deg").in_plane_um
+    ours = table.set_index("half_angle_deg").ours_um
     for angle, published in [(5, 0.08), (7, 0.23), (9, 0.49), (11, 0.91), (13, 1.51), (15, 2.34)]:
         assert ours[angle] == pytest.approx(published, abs=0.02)
-    assert (table.distance_3d_um > 3 * table.in_plane_um).all()
+    assert (table.distance_3d_um > 3 * table.ours_um).all()
 
 
 def test_every_frame_has_its_row_and_every_failure_its_reason(small):
