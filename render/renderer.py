@@ -42,7 +42,7 @@ class Renderer:
         self._shaft = scene.instrument.shaft
         self._responses = responses
         emitter = emitters.spotlight(self._mi, scene)
-        self._lit = self._view(emitter, scene.illumination, samples, self._shaft is not None, closed=True)
+        self._lit = self._view(emitter, scene.illumination, samples, self._shaft is not None)
 
     def tile(self, pose: Pose, spotlight: int, seed: int) -> Tile:
         """The radiance of one spotlight at 1 W; `seed` decides its Monte Carlo noise.
@@ -96,10 +96,19 @@ class Renderer:
     def _ambient(self, with_shaft: bool) -> View:
         samples = self.samples if with_shaft else BACKGROUND_SAMPLES
         emitter = emitters.ambient(self.scene)
-        return self._view(emitter, self.scene.ambient.illumination, samples, with_shaft, closed=False)
+        return self._view(emitter, self.scene.ambient.illumination, samples, with_shaft, like=self._lit)
 
-    def _view(self, emitter: dict[str, Any], light: Light, samples: int, with_shaft: bool, *, closed: bool) -> View:
-        shapes = shaft.shaft_shapes(self._mi, self._shaft) if with_shaft and self._shaft is not None else {}
+    def _view(
+        self, emitter: dict[str, Any], light: Light, samples: int, with_shaft: bool, like: View | None = None
+    ) -> View:
+        """The spotlights' view, or one `like` it in ambient light, which sees no interreflection."""
         return View(
-            self.scene, emitter, light, samples=samples, shapes=shapes, responses=self._responses, closed=closed
+            self.scene,
+            emitter,
+            light,
+            samples=samples,
+            shapes=shaft.shaft_shapes(self._mi, self._shaft) if with_shaft and self._shaft is not None else {},
+            responses=self._responses,
+            closed=like is None,
+            like=like,
         )

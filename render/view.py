@@ -40,7 +40,9 @@ class View:
         shapes: Mapping[str, Any],
         responses: dict[str, Curve] | None = None,
         closed: bool = False,
+        like: View | None = None,
     ) -> None:
+        """Load it. `like` is another view of the same scene, whose retina is shared where the light plays no part."""
         mi, dr, chosen = kernel.load()
         self._mi = mi
         reflectance = Reflectance(scene.retina)
@@ -50,11 +52,15 @@ class View:
         # a channel whose filter blocks all of the light stays black; Mitsuba could not sample a wavelength for it
         self._seen = [i for i, channel in enumerate(channels) if channel.film.integral() > 0.0]
         self._scenes = []
+        self.retina: Any = None
         for group in [[channels[i]] for i in self._seen] if apart else [[channels[i] for i in self._seen]]:
             if not group:
                 continue
-            bsdf = mi.load_dict(reflectance.bsdf(mi, dr, group[0].film if apart else None))
-            self.retina = retina_mesh(mi, scene, bsdf)
+            if apart or like is None or like.retina is None:
+                bsdf = mi.load_dict(reflectance.bsdf(mi, dr, group[0].film if apart else None))
+                self.retina = retina_mesh(mi, scene, bsdf)
+            else:
+                self.retina = like.retina
             integrator: dict[str, Any] = {"type": "direct", "emitter_samples": 1, "bsdf_samples": 0}
             everything = {"retina": self.retina, "light": dict(emitter), **shapes}
             near = scene.camera.height / 1000.0
