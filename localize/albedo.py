@@ -12,6 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import cho_factor, cho_solve
+from scipy.linalg.lapack import dtrtri
 
 Array = NDArray[np.float64]
 _EXPONENT, _KNEE = 2.6, 8.0
@@ -112,7 +113,7 @@ def eliminate(modes: Modes, weights: Array, jacobian: Array, data: Array, amplit
     information = flat @ jacobian.reshape(count, -1).T - right[:, :count].T @ solved[:, :count]
     gradient = flat @ y - right[:, :count].T @ solved[:, count]
     # the diagonal of the inverse is the sum of squares of the inverse factor's columns
-    inverse = np.linalg.inv(np.tril(factor[0]))
+    inverse = np.tril(dtrtri(factor[0], lower=1)[0])
     return Eliminated(information, gradient, solved[:, :count], solved[:, count], np.sum(np.square(inverse), axis=0))
 
 

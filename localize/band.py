@@ -17,14 +17,13 @@ from localize.forward import Sight, ambient_irradiance, light, light_by_surface,
 from localize.noise import NoiseModel, linear_light
 from localize.outline import distances
 from localize.prior import Estimate, Knowns, prior_rows, value, with_value
-from localize.solve import spread, student_weights
+from localize.solve import rest, student_weights
 from localize.start import nearest_outline
 
 Array = NDArray[np.float64]
 _STRIP_BINS = 2.0  # width of a strip along the outline
 _SLOPE_PER_MM = 3.0  # rms gradient of a fundus' log albedo in green light
 _LEVEL = 1.0  # spread of the strips' log albedo
-_LEAST_WHITE = 1e-3
 _LONGEST_STEP_BINS = 3.0
 _FEWEST = 40  # bins
 _STEP = 1e-3  # of eye radius and camera height [mm], for differences
@@ -114,8 +113,7 @@ def fit_band(
             variance = noise.variance(model) / side**2 / np.square(np.maximum(model, 1e-9))
             steady = use & (value_ > 0.0)
             if turn > 0 and np.count_nonzero(steady) > 30:
-                excess = spread(residual[steady]) ** 2 - float(np.median(variance[steady]))
-                whites[c] = float(np.clip(math.sqrt(max(excess, 0.0)), _LEAST_WHITE, 0.3))
+                whites[c] = rest(residual[steady], variance[steady], whites[c])
             variance = variance + whites[c] ** 2
             whitened = residual / np.sqrt(variance)
             weights = use / variance * student_weights(whitened)

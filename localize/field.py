@@ -12,12 +12,11 @@ from localize.albedo import FUNDUS_AMPLITUDE, Eliminated, Modes, eliminate
 from localize.band import SETTLED_SIGMAS
 from localize.noise import NoiseModel
 from localize.prior import Estimate, Knowns, prior_rows
-from localize.solve import spread, student_weights
+from localize.solve import rest, student_weights
 from localize.view import Channel, Grid, Window, channels
 
 Array = NDArray[np.float64]
 _WHITE = 0.1  # of the albedo beyond the modes, before it has been measured
-_LEAST_WHITE = 1e-3
 _LONGEST_STEP_MM = 0.15
 _DONE_SIGMAS = 0.05
 
@@ -166,8 +165,7 @@ class _Term:
         inner = spots & usable
         white = field.white
         if not fresh and np.count_nonzero(inner) > 30:
-            excess = spread(residual[inner]) ** 2 - float(np.median(sensor[inner]))
-            white = float(np.clip(np.sqrt(max(excess, 0.0)), _LEAST_WHITE, 0.3))
+            white = rest(residual[inner], sensor[inner], white)
         self.field = Field(log_gain, white, field.amplitude)
         variance = sensor + white**2 + plane.template_variance.ravel()
         weights = use / variance

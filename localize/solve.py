@@ -25,6 +25,17 @@ def spread(residuals: Array) -> float:
     return 1.4826 * float(np.median(np.abs(residuals))) if len(residuals) else 0.0
 
 
+_REST = (1e-4, 0.3)
+
+
+def rest(residuals: Array, variances: Array, before: float) -> float:
+    """What residuals scatter beyond the sensor's `variances`, one step from `before`: albedo nothing else explains."""
+    whole = variances + before**2
+    ratio = spread(residuals / np.sqrt(whole)) ** 2
+    found = before**2 + (ratio - 1.0) * float(np.median(whole))
+    return float(np.sqrt(np.clip(found, _REST[0] ** 2, _REST[1] ** 2)))
+
+
 @dataclass(frozen=True)
 class Solution:
     """A minimum: the estimate, the information matrix there and the whitened residuals of the data."""

@@ -51,6 +51,11 @@ def cast(scene, x, y):
     return scene.surface.intersect(scene.eye, scene.camera.centre, rays)
 
 
+def upward(scene, points):
+    """Cosine of incidence of the microscope's light."""
+    return (scene.eye.radius - points[..., 2]) / scene.eye.radius
+
+
 def spotlight(scene, pose, points):
     outward = points - scene.eye.centre
     normals = scene.surface.normals(scene.eye, outward / np.linalg.norm(outward, axis=-1, keepdims=True))
@@ -67,7 +72,8 @@ def photograph(scene, pose, texture=None, seed=0, rays=None, noise=True):
     k = rays or (16 if isinstance(scene.beam, HardBeam) else 4)
     centres = np.arange(side) + 0.5
     plain = scene.model_copy(update={"surface": Scene().surface})
-    electrons = AMBIENT * albedo(texture, cast(plain, centres, centres)).astype(float)
+    wall = cast(plain, centres, centres)
+    electrons = AMBIENT * albedo(texture, wall) * upward(scene, wall)
     outlines = [scene.camera.project(scene.outline(pose, i)) for i in range(len(scene.spotlights))]
     every = np.concatenate(outlines)
     low = np.floor(np.nanmin(every, axis=0)).astype(int).clip(2) - 2
@@ -77,7 +83,7 @@ def photograph(scene, pose, texture=None, seed=0, rays=None, noise=True):
         x = low[0] + (np.arange((high[0] - low[0]) * k) + 0.5) / k
         points = cast(scene, x, row + (np.arange(k) + 0.5) / k)
         a = albedo(texture, points)
-        both = np.stack([a, a * spotlight(scene, pose, points)])
+        both = np.stack([a * upward(scene, points), a * spotlight(scene, pose, points)])
         patch.append(both.reshape(2, k, -1, k).mean(axis=(1, 3)))
     ambient, light = np.stack(patch, axis=1)
     region = electrons[low[1] : high[1], low[0] : high[0]]
