@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from localize.forward import Sight, ambient_irradiance, light, light_by_surface, look
-from localize.noise import NoiseModel, linear_light
+from localize.noise import NoiseModel, SensorNoise, linear_light
 from localize.outline import distances
 from localize.prior import Estimate, Knowns, prior_rows, value, with_value
 from localize.solve import rest, student_weights
@@ -26,6 +26,8 @@ _SLOPE_PER_MM = 3.0  # rms gradient of a fundus' log albedo in green light
 _LEVEL = 1.0  # spread of the strips' log albedo
 _LONGEST_STEP_BINS = 3.0
 _FEWEST = 40  # bins
+#: rounded values share their error along the whole rim: measured on clipped 8-bit frames, not derived
+_ROUNDED_INFLATION = 9.0
 _STEP = 1e-3  # of eye radius and camera height [mm], for differences
 _DONE_SIGMAS = 0.05  # a step this short ends the iterations
 #: a last step longer than this, in sigmas of uncorrelated residuals, means that the fit does not settle
@@ -87,6 +89,8 @@ def fit_band(
     precision = np.array([1.0 / _LEVEL**2, 1.0 / (_SLOPE_PER_MM * pitch) ** 2])
     levels = [np.zeros((count, 2)) for _ in bins.signal]
     gain = list(gains)
+    rounded = isinstance(noise, SensorNoise) and noise.electrons is None
+    dark_bins = max(1.0, outer * _STRIP_BINS)
     settled, misfits, information, correlation = False, [math.inf], np.eye(size), 1.0
     for turn in range(iterations):
         value_, rows = _spotlight(sight, estimate, knowns, bins.pixels, side, roll=roll)
@@ -111,6 +115,9 @@ def fit_band(
             residual[bound] = -np.log(np.maximum(model[bound], 1e-6))
             use = usable | bound
             variance = noise.variance(model) / side**2 / np.square(np.maximum(model, 1e-9))
+            if rounded:
+                # nearly equal values are rounded alike: a strip's dark side counts once, not once a bin
+                variance = np.where(value_ > 0.0, variance, variance * dark_bins)
             steady = use & (value_ > 0.0)
             if turn > 0 and np.count_nonzero(steady) > 30:
                 whites[c] = rest(residual[steady], variance[steady], whites[c])
@@ -128,7 +135,7 @@ def fit_band(
             information = information + full[:-1, :-1] - np.outer(full[:-1, -1], full[-1, :-1]) / pivot
             gradient = gradient + grad[:-1] - full[:-1, -1] * grad[-1] / pivot
             slow.append(_slow_share(residual * weights, brightness, strips, count))
-        correlation = float(np.mean(slow))
+        correlation = float(np.mean(slow)) * (_ROUNDED_INFLATION if rounded else 1.0)
         scale = np.sqrt(np.maximum(np.diag(information), 1e-300))
         try:
             step = np.linalg.solve(information / np.outer(scale, scale), gradient / scale) / scale
@@ -145,7 +152,7 @@ def fit_band(
             gain[c] += own
             levels[c] = part.levels(np.append(step, own))
         length = math.sqrt(max(0.0, float(step @ information @ step)))
-        settled = length < SETTLED_SIGMAS
+        settled = length < SETTLED_SIGMAS * math.sqrt(correlation)
         if length < _DONE_SIGMAS and turn >= 2:
             break
     return BandFit(

@@ -111,7 +111,7 @@ def fit_field(
         misfit = float(np.sqrt(np.mean(np.square(misfits))))
         correlation = float(np.mean([part.correlation for part in parts]))
         length = float(np.sqrt(max(0.0, float(step @ information @ step))))
-        settled = length < SETTLED_SIGMAS
+        settled = length < SETTLED_SIGMAS * float(np.sqrt(correlation))
         if length < _DONE_SIGMAS and count >= max(tied, 2):
             break
     inside = grid.lit[light > 0.0]

@@ -17,10 +17,13 @@ from localize.outcome import LocalizationFailure, Outcome
 from localize.prior import Estimate, Knowns
 from localize.start import Start, find_start
 from localize.verdict import COVERED, UNCERTAIN, judged
+from localize.view import outlines
 from scene.scene import Scene
 
 #: bins across the patch, modes a side, iterations, of which tied to the RCM
 _LEVELS = ((64, 10, 7, 3), (130, 16, 8, 0))
+#: modes of the last level where pixels are binned: their noise no longer hides the retina's finer detail
+_BINNED_MODES = 25
 
 
 def photometric(
@@ -69,7 +72,10 @@ def fit_patch(
     """The field fit, coarse to fine, or why there is none."""
     estimate, fields = Estimate.at(start.pose, scene), tuple[Field, ...]()
     fit: FieldFit | None = None
-    for number, (bins, modes, iterations, tied) in enumerate(_LEVELS):
+    points = outlines(estimate)
+    binned = len(points) > 0 and float(np.max(np.ptp(points, axis=0))) >= 2.0 * _LEVELS[-1][0]
+    for number, (bins, plain, iterations, tied) in enumerate(_LEVELS):
+        modes = _BINNED_MODES if binned and number + 1 == len(_LEVELS) else plain
         fit = fit_field(
             image, estimate, fields, knowns, noise,
             bins=bins, modes=modes, iterations=iterations, tied=tied, reference=reference, frames=frames,
