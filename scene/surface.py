@@ -72,7 +72,7 @@ class Surface(Model):
         return n / np.linalg.norm(n, axis=-1, keepdims=True)
 
     def intersect(self, eye: Eye, origin: ArrayLike, direction: ArrayLike) -> Array:
-        """Where rays with origins and unit directions `[..., 3]` meet the far wall: points `[..., 3]` [mm], NaN for none.
+        """Where rays (origins, unit directions `[..., 3]`) meet the far wall: points `[..., 3]` [mm], NaN for none.
 
         Fixed point on the radius: the displaced wall is met where the sphere of the radius found last is. A ray that
         grazes a bump's flank may meet it more than once; the meeting nearest the undisturbed sphere is returned.
