@@ -18,8 +18,9 @@ MISFIT = "the light in the patch contradicts the model of the beam"
 OUTSIDE = "the fitted tip is outside the eye"
 COVERED = "too little of the patch is in the frame"
 UNSETTLED = "the fit does not settle"
-#: largest sigma of the tip that is returned [mm]
-LARGEST_SIGMA_MM = 0.06
+#: largest sigma of the tip that is returned [mm]; a free fit may run off along what it hardly sees, a tied one cannot
+LARGEST_SIGMA_MM = 0.15
+LARGEST_FREE_SIGMA_MM = 0.06
 _LARGEST_MISFIT = 2.5
 _LEAST_COVERED = 0.35
 _MISS_SIGMAS = 5.0
@@ -55,7 +56,8 @@ def judged(
     pose[np.arange(3), np.arange(3)] += _FLOOR_MM**2
     pose[np.arange(3, size), np.arange(3, size)] += _FLOOR_RAD**2
     sigma = math.sqrt(float(np.trace(pose[:3, :3])))
-    if not math.isfinite(sigma) or sigma > LARGEST_SIGMA_MM:
+    limit = LARGEST_FREE_SIGMA_MM if knowns.rcm_sigma_mm is None else LARGEST_SIGMA_MM
+    if not math.isfinite(sigma) or sigma > limit:
         return LocalizationFailure(UNCERTAIN)
     if knowns.rcm_sigma_mm is not None:
         reach = float(np.linalg.norm(np.asarray(nominal.instrument.rcm) - estimate.pose.apex))
