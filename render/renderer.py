@@ -13,6 +13,7 @@ from render.tile import Crop, Tile
 from render.view import View
 from scene import Pose, Scene
 from scene.illumination import Light
+from scene.retina import Fundus, FundusSite
 from scene.spectrum import Curve
 from scene.spotlights import spotlight_axes
 
@@ -20,6 +21,8 @@ Image = NDArray[np.float32]
 
 #: the ambient light is collimated and the texture smooth, so the background needs few samples a pixel
 BACKGROUND_SAMPLES = 4
+#: what varies with the wavelength needs more: it leaves 1.2 % of noise in white light where 4 leave 9 %
+SPECTRAL_BACKGROUND_SAMPLES = 16
 #: the background belongs to the scene and not to a run: every run sees the same one
 BACKGROUND_SEED = 0
 
@@ -88,13 +91,18 @@ class Renderer:
     def _empty_background(self) -> Image:
         n = self.scene.camera.resolution
         self.rendered += 1
-        frame = self._ambient(with_shaft=False).render(Crop(0, 0, n, n), BACKGROUND_SAMPLES, BACKGROUND_SEED)
+        frame = self._ambient(with_shaft=False).render(Crop(0, 0, n, n), self._background_samples, BACKGROUND_SEED)
         frame.flags.writeable = False
         return frame
 
+    @property
+    def _background_samples(self) -> int:
+        spectral_retina = isinstance(self.scene.retina, (Fundus, FundusSite))
+        return SPECTRAL_BACKGROUND_SAMPLES if spectral_retina else BACKGROUND_SAMPLES
+
     @functools.lru_cache(maxsize=2)  # noqa: B019 - a renderer lives as long as its process
     def _ambient(self, with_shaft: bool) -> View:
-        samples = self.samples if with_shaft else BACKGROUND_SAMPLES
+        samples = self.samples if with_shaft else self._background_samples
         emitter = emitters.ambient(self.scene)
         return self._view(emitter, self.scene.ambient.illumination, samples, with_shaft, like=self._lit)
 
