@@ -78,6 +78,17 @@ def begin(folder, run, finished):
     raise TimeoutError("nothing was finished in a minute")
 
 
+def test_a_metered_camera_exposes_alike_on_every_worker(tmp_path):
+    """A noisy camera that sets its exposure time once a campaign: rows of one worker against those of two."""
+    (tmp_path / "m.yaml").write_text(TEXT + "  scene.sensor: [cmv12000-mono]\n")
+    runs = [tmp_path / "one", tmp_path / "two"]
+    for workers, run in enumerate(runs, start=1):
+        done = campaign("run", "m.yaml", "--workers", workers, "--poses", 4, "--out", run, cwd=tmp_path)
+        assert done.returncode == 0, done.stderr
+    assert (runs[0] / "errors.csv").read_bytes() == (runs[1] / "errors.csv").read_bytes()
+    assert (pd.read_csv(runs[0] / "errors.csv")["status"] == "ok").any()
+
+
 def test_an_interrupted_and_a_killed_run_go_on_to_the_same_bytes(folder, straight):
     """Ctrl-C after one pose, kill -9 after another with a torn line behind it, then to the end."""
     run = folder / "broken"
