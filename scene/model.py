@@ -5,9 +5,10 @@ from __future__ import annotations
 import difflib
 import hashlib
 import json
+from collections.abc import Mapping
 from typing import Any
 
-from pydantic import BaseModel, ConfigDict, model_validator
+from pydantic import BaseModel, BeforeValidator, ConfigDict, model_validator
 from pydantic_core import PydanticCustomError
 
 
@@ -40,6 +41,19 @@ def unknown_name(name: str, known: list[str], what: str) -> PydanticCustomError:
     return PydanticCustomError(
         "unknown_name", "unknown {what} '{name}'; {hint}", {"what": what, "name": name, "hint": hint}
     )
+
+
+def named(known: Mapping[str, Any], what: str) -> BeforeValidator:
+    """Lets a file name one of `known` (a `what`) in place of writing it out."""
+
+    def look_up(value: Any) -> Any:
+        if not isinstance(value, str):
+            return value
+        if value not in known:
+            raise unknown_name(value, list(known), what)
+        return known[value]
+
+    return BeforeValidator(look_up)
 
 
 def identity(*parts: BaseModel | str | int | float | None) -> str:

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Any, Literal
+from typing import Annotated, Literal
 
-from pydantic import BeforeValidator, Field, model_validator
+from pydantic import Field, model_validator
 
-from scene.model import Model, unknown_name
+from scene.model import Model, named
 
 _Albedo = Annotated[float, Field(gt=0.0, le=1.0)]
 
@@ -74,14 +74,6 @@ class Fundus(Model):
     glint: Glint | None = None
 
 
-def _named_retina(value: Any) -> Any:
-    if isinstance(value, str):
-        if value not in RETINAS:
-            raise unknown_name(value, list(RETINAS), "retina")
-        return RETINAS[value]
-    return value
-
-
 AnyRetina = UniformRetina | PhotoRetina | FundusSite | Fundus
 RETINAS: dict[str, AnyRetina] = {
     "uniform": UniformRetina(),
@@ -94,4 +86,4 @@ RETINAS: dict[str, AnyRetina] = {
     "perifovea": FundusSite(site="perifovea"),
     "fovea": FundusSite(site="fovea"),
 }
-Retina = Annotated[Annotated[AnyRetina, Field(discriminator="kind")], BeforeValidator(_named_retina)]
+Retina = Annotated[Annotated[AnyRetina, Field(discriminator="kind")], named(RETINAS, "retina")]

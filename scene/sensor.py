@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Any, Literal
+from typing import Annotated, Literal
 
-from pydantic import BeforeValidator, Field
+from pydantic import Field
 
 from scene.emva import EMVA_PRESETS, Emva
-from scene.model import Model, unknown_name
+from scene.model import Model, named
 from scene.quantity import Radiance
 
 _White = Annotated[Radiance, Field(gt=0.0)]
@@ -42,18 +42,10 @@ AnySensor = Srgb8 | Linear | Emva
 SENSORS: dict[str, AnySensor] = {"srgb8": Srgb8(), "linear": Linear(), **EMVA_PRESETS}
 
 
-def _named_sensor(value: Any) -> Any:
-    if isinstance(value, str):
-        if value not in SENSORS:
-            raise unknown_name(value, list(SENSORS), "sensor")
-        return SENSORS[value]
-    return value
-
-
 def sensor_name(sensor: AnySensor) -> str:
     """The name of a preset, or the kind (for a camera its chip) of a sensor of one's own."""
-    named = (name for name, known in SENSORS.items() if known == sensor)
-    return next(named, sensor.chip if isinstance(sensor, Emva) else sensor.kind)
+    alike = (name for name, known in SENSORS.items() if known == sensor)
+    return next(alike, sensor.chip if isinstance(sensor, Emva) else sensor.kind)
 
 
-Sensor = Annotated[Annotated[AnySensor, Field(discriminator="kind")], BeforeValidator(_named_sensor)]
+Sensor = Annotated[Annotated[AnySensor, Field(discriminator="kind")], named(SENSORS, "sensor")]

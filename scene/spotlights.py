@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import math
-from typing import Annotated, Any
+from typing import Annotated
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import BeforeValidator, Field
+from pydantic import Field
 
-from scene.model import Model, unknown_name
+from scene.model import Model, named
 from scene.pose import Pose, rot_x, rot_y
 from scene.quantity import Angle, Length
 
@@ -29,15 +29,7 @@ RIGS = {
 }
 
 
-def _named_rig(value: Any) -> Any:
-    if isinstance(value, str):
-        if value not in RIGS:
-            raise unknown_name(value, list(RIGS), "spotlight rig")
-        return RIGS[value]
-    return value
-
-
-Spotlights = Annotated[tuple[Spotlight, ...], BeforeValidator(_named_rig), Field(min_length=1, max_length=16)]
+Spotlights = Annotated[tuple[Spotlight, ...], named(RIGS, "spotlight rig"), Field(min_length=1, max_length=16)]
 
 
 def rig_name(spotlights: tuple[Spotlight, ...]) -> str:

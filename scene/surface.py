@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Any
+from typing import Annotated
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from pydantic import BeforeValidator, Field
+from pydantic import Field
 
 from scene.eye import Eye
-from scene.model import Model, unknown_name
+from scene.model import Model, named
 from scene.quantity import Length
 
 Array = NDArray[np.float64]
@@ -113,15 +113,7 @@ def bump_grid() -> Surface:
 SURFACES = {"smooth": Surface(), "bumps": bump_grid()}
 
 
-def _named_surface(value: Any) -> Any:
-    if isinstance(value, str):
-        if value not in SURFACES:
-            raise unknown_name(value, list(SURFACES), "surface")
-        return SURFACES[value]
-    return value
-
-
-AnySurface = Annotated[Surface, BeforeValidator(_named_surface)]
+AnySurface = Annotated[Surface, named(SURFACES, "surface")]
 
 
 def surface_name(surface: Surface) -> str:
