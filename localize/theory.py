@@ -19,6 +19,7 @@ from localize.prior import Estimate, Knowns, prior_rows, value, with_value
 from localize.profile import Profile
 from scene.pose import Pose
 from scene.scene import Scene
+from scene.surface import Surface
 
 Array = NDArray[np.float64]
 #: quantities whose tolerances the error budget states, with the tolerance it assumes
@@ -169,8 +170,6 @@ def error_budget(
 
 def _believed(scene: Scene, pose: Pose, name: str, error: float, *, rcm: bool) -> Array:
     """The step `[5 or 6]` an outline fit takes off the truth when it believes `name` to be larger by `error`."""
-    roll = len(scene.spotlights) > 1
-    size = 6 if roll else 5
     outlines = [scene.camera.project(scene.outline(pose, k, 256)) for k in range(len(scene.spotlights))]
     spots = np.repeat(np.arange(len(outlines)), 256)
     pixels = np.concatenate(outlines)
@@ -187,8 +186,19 @@ def _believed(scene: Scene, pose: Pose, name: str, error: float, *, rcm: bool) -
         believed = scene.model_copy(update={"instrument": scene.instrument.model_copy(update={"rcm": moved})})
     else:
         believed = with_value(scene, name, value(scene, name) + error)
-    at = Estimate(pose, believed, half_angle)
+    return _step(pixels, spots, Estimate(pose, believed, half_angle), rcm=rcm)
+
+
+def smoothed_over(scene: Scene, pose: Pose, *, rcm: bool) -> Array:
+    """The step `[5 or 6]` [mm, rad] an outline fit takes off the truth when it takes the scene's surface for smooth."""
+    outlines = [scene.camera.project(scene.outline(pose, k, 256)) for k in range(len(scene.spotlights))]
+    smooth = scene.model_copy(update={"surface": Surface()})
+    spots = np.repeat(np.arange(len(outlines)), 256)
+    return _step(np.concatenate(outlines), spots, Estimate.at(pose, smooth), rcm=rcm)
+
+
+def _step(pixels: Array, spots: NDArray[np.intp], at: Estimate, *, rcm: bool) -> Array:
+    roll = len(at.scene.spotlights) > 1
     r, jac, _ = distances(pixels, spots, at, roll=roll)
-    knowns = Knowns(rcm_sigma_mm=0.0 if rcm else None)
-    pr, pj = prior_rows(at, believed, knowns, size)
+    pr, pj = prior_rows(at, at.scene, Knowns(rcm_sigma_mm=0.0 if rcm else None), 6 if roll else 5)
     return np.asarray(-np.linalg.solve(jac.T @ jac + pj.T @ pj, jac.T @ r + pj.T @ pr))

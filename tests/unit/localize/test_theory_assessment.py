@@ -1,0 +1,41 @@
+"""What the error budget says of bumps and sensors."""
+
+import math
+
+import numpy as np
+import pytest
+
+from localize.assessment import electrons_of
+from localize.outline import fit_outline
+from localize.prior import Knowns
+from localize.theory import Electrons, smoothed_over
+from scene.camera import Camera
+from scene.emva import Emva
+from scene.scene import Scene
+from scene.sensor import Linear
+from scene.surface import bump_grid
+
+TIP = np.array([0.0, 0.0, 6.0])  # its outline crosses a bump
+
+
+def test_a_smooth_surface_taken_for_smooth_moves_nothing():
+    scene = Scene()
+    assert np.abs(smoothed_over(scene, scene.pose(TIP), rcm=False)).max() < 1e-9
+
+
+def test_the_step_off_the_truth_is_where_a_whole_fit_of_the_bumpy_outline_ends():
+    bumpy = Scene(surface=bump_grid(), camera=Camera(resolution=1000))
+    pose = bumpy.pose(TIP)
+    pixels = bumpy.camera.project(bumpy.outline(pose, 0, 256))
+    fit = fit_outline(pixels, Scene(camera=bumpy.camera), knowns=Knowns(rcm_sigma_mm=None), start=pose, robust=False)
+    step = smoothed_over(bumpy, pose, rcm=False)
+    assert np.linalg.norm(step[:3]) > 0.02
+    np.testing.assert_allclose(fit.estimate.pose.apex - pose.apex, step[:3], atol=0.1 * np.linalg.norm(step[:3]))
+
+
+def test_a_camera_is_metered_as_it_says_and_any_other_sensor_stands_for_9000_electrons():
+    assert electrons_of(Scene(sensor=Linear())) == Electrons()
+    camera = Emva(full_well=10000.0, gain=0.3, read_noise=12.0)
+    found = electrons_of(Scene(sensor=camera))
+    assert found.peak == pytest.approx(8000.0)
+    assert found.background == pytest.approx(math.sqrt(144.0 + 1.0 / (12.0 * 0.09)))
