@@ -76,8 +76,11 @@ def _parser() -> argparse.ArgumentParser:
     run = add("run", _run, "render, localize and compare; an interrupted run is continued")
     plan = add("plan", _plan, "say what a run would do")
     validate = add("validate", _validate, "check a campaign and every combination it sweeps over")
-    for command in (run, plan, validate):
-        command.add_argument("campaign", help="a YAML file, or the name of a shipped campaign")
+    theory = add("theory", _theory, "say how well a scene could be localized: bounds, error budget, design guidance")
+    theory.add_argument("scene", nargs="?", default="paper-code", help="a preset or a YAML file (default: paper-code)")
+    for command in (run, plan, validate, theory):
+        if command is not theory:
+            command.add_argument("campaign", help="a YAML file, or the name of a shipped campaign")
         command.add_argument(
             "--set",
             action="append",
@@ -85,10 +88,12 @@ def _parser() -> argparse.ArgumentParser:
             metavar="KEY=VALUE",
             help="set a key, such as scene.eye.radius='12 mm'",
         )
+    for command in (run, plan, validate):
         for name, (_, metavar, text) in _SETTINGS.items():
             command.add_argument(f"--{name}", metavar=metavar, help=text)
     run.add_argument("--dry-run", action="store_true", help="only say what the run would do")
     run.add_argument("--out", metavar="FOLDER", help="the run folder (default: runs/NAME)")
+    theory.add_argument("--out", metavar="FOLDER", help="where to write (default: runs/theory-SCENE)")
     for command in (run, plan):
         command.add_argument(
             "--workers", metavar="N", type=_workers, default=_cores(), help="processes (default: cores)"
@@ -118,8 +123,7 @@ def _cores() -> int:
 
 def _document(options: argparse.Namespace) -> Document:
     """The campaign's file with the settings of the command line on it."""
-    from campaigns.schema import override, read_campaign
-    from scene import InputError
+    from campaigns.schema import override, read_campaign, setting
 
     document = read_campaign(options.campaign)
     for name, (key, _, _) in _SETTINGS.items():
@@ -127,11 +131,9 @@ def _document(options: argparse.Namespace) -> Document:
         if value is not None:
             text = f"[{value}]" if name == "localizers" else value
             document = override(document, key, text, f"--{name}")
-    for setting in options.set:
-        key, equals, value = setting.partition("=")
-        if not equals or not key:
-            raise InputError(f"--set {setting}: write KEY=VALUE, such as --set poses=10")
-        document = override(document, key.strip(), value, f"--set {key.strip()}")
+    for text in options.set:
+        key, value = setting(text)
+        document = override(document, key, value, f"--set {key}")
     return document
 
 
@@ -175,6 +177,15 @@ def _run(options: argparse.Namespace) -> Ending:
     if code != Ending.INTERRUPTED:
         _write_results(folder)
     return code
+
+
+def _theory(options: argparse.Namespace) -> Ending:
+    from campaigns.theory import write_theory_of
+
+    folder, text = write_theory_of(options.scene, options.set, options.out)
+    _say(text)
+    _say(f"{folder}: table_1.csv, bounds.csv, budget.csv, design.csv, theory.txt, budget and design as PNG and SVG")
+    return Ending.DONE
 
 
 def _report(options: argparse.Namespace) -> Ending:

@@ -108,6 +108,14 @@ def override(document: Document, key: str, text: str, option: str) -> Document:
     return replace(document, data=data, lines={**kept, at: option})
 
 
+def setting(text: str) -> tuple[str, str]:
+    """Key and value of what follows --set. Raises InputError."""
+    key, equals, value = text.partition("=")
+    if not equals or not key:
+        raise InputError(f"--set {text}: write KEY=VALUE, such as --set poses=10")
+    return key.strip(), value
+
+
 def _settled(product: dict[str, Any], path: tuple[str, ...], value: Any) -> dict[str, Any]:
     """A product without the axes that `path` settles, and with `value` laid on the items of those above it."""
     settled: dict[str, Any] = {}
