@@ -13,10 +13,11 @@ import numpy as np
 
 from localize.conic import table_1
 from localize.design import beam_of, compare_designs
-from localize.prior import Knowns
-from localize.theory import Electrons, cramer_rao, error_budget, smoothed_over
+from localize.prior import Estimate, Knowns, prior_rows
+from localize.theory import Bound, Electrons, cramer_rao, error_budget, smoothed_over
 from scene.document import InputError
 from scene.emva import Emva
+from scene.pose import Pose
 from scene.scene import Scene
 from scene.surface import bump_grid
 
@@ -73,6 +74,12 @@ def electrons_of(scene: Scene) -> Electrons:
     return Electrons(level * camera.saturation, math.sqrt(camera.read_noise**2 + 1.0 / (12.0 * camera.gain**2)))
 
 
+def tied(free: Bound, scene: Scene, pose: Pose, rcm_sigma_mm: float | None) -> Bound:
+    """The bound once the RCM is known so well: its information adds to that of the image, nuisances taken out."""
+    _, prior = prior_rows(Estimate.at(pose, scene), scene, Knowns(rcm_sigma_mm=rcm_sigma_mm), len(free.covariance))
+    return Bound(np.asarray(np.linalg.inv(np.linalg.inv(free.covariance) + prior.T @ prior), float))
+
+
 def _at(scene: Scene, *, resolution: int | None = None, softness: float | None = None) -> Scene:
     camera = scene.camera.model_copy(update={"resolution": resolution or scene.camera.resolution})
     beam = scene.beam if softness is None else beam_of(scene.beam.half_angle, softness)
@@ -97,8 +104,10 @@ def _bounds(scene: Scene, sensor: Electrons) -> list[Record]:
         for edge, softness in {"hard": 0.0, "soft": 1.0}.items():
             changed = _at(scene, resolution=resolution, softness=softness)
             for tip in (LOW, HIGH):
+                pose = changed.pose(np.array(tip))
+                free = cramer_rao(changed, pose, sensor)
                 for rcm, sigma in _RCM.items():
-                    bound = cramer_rao(changed, changed.pose(np.array(tip)), sensor, Knowns(rcm_sigma_mm=sigma))
+                    bound = tied(free, changed, pose, sigma)
                     values = {"position_um": 1e3 * bound.position_mm, "axis_deg": math.degrees(bound.axis_rad)}
                     found.append({"resolution_px": resolution, "edge": edge, "height_mm": tip[2], "rcm": rcm, **values})
     return found
@@ -108,16 +117,14 @@ def _budget(scene: Scene, sensor: Electrons) -> list[Record]:
     found: list[Record] = []
     for tip in (LOW, HIGH):
         pose = scene.pose(np.array(tip))
-        for rcm, sigma in (("free", None), ("exact", 0.0)):
+        sides = (scene.camera.resolution, scene.camera.resolution // 2)
+        free = [cramer_rao(_at(scene, resolution=side), pose, sensor) for side in sides]
+        for rcm in ("free", "exact"):
             moves = [
                 (part.quantity, *_in_degrees(part.quantity, part.tolerance), part.position_mm, part.axis_rad)
                 for part in error_budget(scene, pose, rcm=rcm == "exact")
             ]
-            known = Knowns(rcm_sigma_mm=sigma)
-            here, coarse = (
-                cramer_rao(_at(scene, resolution=side), pose, sensor, known)
-                for side in (scene.camera.resolution, scene.camera.resolution // 2)
-            )
+            here, coarse = (tied(bound, scene, pose, _RCM[rcm]) for bound in free)
             pixel = 1e3 * scene.camera.sensor_width / scene.camera.resolution
             wider = (coarse.position_mm - here.position_mm, coarse.axis_rad - here.axis_rad)
             moves += [

@@ -5,10 +5,10 @@ import math
 import numpy as np
 import pytest
 
-from localize.assessment import electrons_of
+from localize.assessment import electrons_of, tied
 from localize.outline import fit_outline
 from localize.prior import Knowns
-from localize.theory import Electrons, smoothed_over
+from localize.theory import Electrons, cramer_rao, smoothed_over
 from scene.camera import Camera
 from scene.emva import Emva
 from scene.scene import Scene
@@ -39,3 +39,13 @@ def test_a_camera_is_metered_as_it_says_and_any_other_sensor_stands_for_9000_ele
     found = electrons_of(Scene(sensor=camera))
     assert found.peak == pytest.approx(8000.0)
     assert found.background == pytest.approx(math.sqrt(144.0 + 1.0 / (12.0 * 0.09)))
+
+
+@pytest.mark.parametrize("sigma", [None, 0.05, 0.0])
+def test_knowing_the_rcm_afterwards_is_knowing_it_from_the_start(sigma):
+    scene = Scene(camera=Camera(resolution=500))
+    pose = scene.pose(TIP)
+    after = tied(cramer_rao(scene, pose), scene, pose, sigma)
+    before = cramer_rao(scene, pose, knowns=Knowns(rcm_sigma_mm=sigma))
+    assert after.position_mm == pytest.approx(before.position_mm, rel=1e-3)
+    assert after.axis_rad == pytest.approx(before.axis_rad, rel=1e-3)
