@@ -26,16 +26,15 @@ def described_scene(name: str, settings: Sequence[str]) -> Scene:
 
 def write_theory_of(name: str, settings: Sequence[str], out: str | None) -> tuple[Path, str]:
     """Assess a scene and write what is found: the folder, and the text of its tables. Raises InputError."""
-    scene = described_scene(name, settings)
+    from localize.assessment import assess
+    from results.theory import write_theory
+
+    found = assess(described_scene(name, settings))
     folder = Path(out or Path("runs") / f"theory-{Path(name).stem}")
     try:
         folder.mkdir(parents=True, exist_ok=True)
     except OSError as error:
         reason = "is a file, not a folder" if folder.is_file() else f"cannot be written: {error.strerror}"
         raise InputError(f"{folder}: {reason}; choose another --out") from None
-    from localize.assessment import assess
-    from results.theory import write_theory
-
-    found = assess(scene)
     tables = {"table_1": found.table_1, "bounds": found.bounds, "budget": found.budget, "design": found.design}
     return folder, write_theory(folder, tables, name, found.assumes)
