@@ -69,11 +69,6 @@ class View:
                 everything.update(globe.globe_shapes(mi, scene, scene.interreflection))
                 depth = scene.interreflection.bounces + 1
                 integrator = {"type": "path", "max_depth": depth, "rr_depth": depth}
-            near = (
-                globe.near_plane(scene)
-                if closed and scene.interreflection is not None
-                else scene.camera.height / 1000.0
-            )
             sensor = _sensor(mi, scene, group, samples, near)
             self._scenes.append(
                 mi.load_dict({"type": "scene", "integrator": integrator, "sensor": sensor, **everything})
