@@ -13,12 +13,13 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from localize.forward import Sight, ambient_irradiance, light, light_by_surface, look
+from localize.forward import ambient_irradiance, look
 from localize.noise import NoiseModel, SensorNoise, linear_light
 from localize.outline import distances
-from localize.prior import Estimate, Knowns, prior_rows, value, with_value
+from localize.prior import Estimate, Knowns, prior_rows
 from localize.solve import rest, student_weights
 from localize.start import nearest_outline
+from localize.view import spotlight_irradiance
 
 Array = NDArray[np.float64]
 _STRIP_BINS = 2.0  # width of a strip along the outline
@@ -28,7 +29,6 @@ _LONGEST_STEP_BINS = 3.0
 _FEWEST = 40  # bins
 #: rounded values share their error along the whole rim: measured on clipped 8-bit frames, not derived
 _ROUNDED_INFLATION = 9.0
-_STEP = 1e-3  # of eye radius and camera height [mm], for differences
 _DONE_SIGMAS = 0.05  # a step this short ends the iterations
 #: a last step longer than this, in sigmas of uncorrelated residuals, means that the fit does not settle
 SETTLED_SIGMAS = 1.0
@@ -93,7 +93,7 @@ def fit_band(
     dark_bins = max(1.0, outer * _STRIP_BINS)
     settled, misfits, information, correlation = False, [math.inf], np.eye(size), 1.0
     for turn in range(iterations):
-        value_, rows = _spotlight(sight, estimate, knowns, bins.pixels, side, roll=roll)
+        value_, rows = spotlight_irradiance(sight, estimate, knowns, bins.pixels, side, roll=roll)
         if not gain:
             gain = [
                 _first_gain(s, u, irradiance, value_, offset) for s, u in zip(bins.signal, bins.usable, strict=True)
@@ -227,27 +227,6 @@ def _strips(
         angle = np.arctan2(pixels[mine, 1] - middle[1], pixels[mine, 0] - middle[0]) + math.pi
         result[mine] = k * per_spot + np.minimum((angle * per_spot / (2.0 * math.pi)).astype(np.intp), per_spot - 1)
     return result, per_spot * spotlights
-
-
-def _spotlight(
-    sight: Sight, estimate: Estimate, knowns: Knowns, pixels: Array, side: int, *, roll: bool
-) -> tuple[Array, Array]:
-    """The spotlights' irradiance on the bins `[N]` and its derivatives by pose and free quantities `[P, N]`."""
-    free = knowns.free
-    here_sight = look(estimate.scene, pixels, side) if {"eye_radius", "camera_height"} & set(free) else sight
-    profile = estimate.profile
-    here = light(here_sight, estimate.pose, estimate.scene, profile, roll=roll, half_angle="half_angle" in free)
-    rows = [here.jacobian[: 6 if roll else 5]]
-    for name in free:
-        if name == "half_angle":
-            rows.append(here.jacobian[-1:])
-            continue
-        plus, minus = (
-            look(with_value(estimate.scene, name, value(estimate.scene, name) + step), pixels, side)
-            for step in (_STEP, -_STEP)
-        )
-        rows.append(light_by_surface(here, here_sight, estimate.pose, (plus, minus), _STEP)[None])
-    return here.value, np.concatenate(rows)
 
 
 @dataclass(frozen=True)

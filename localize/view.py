@@ -148,21 +148,28 @@ class Grid:
 
     def spotlight(self, estimate: Estimate, *, roll: bool) -> tuple[Array, Array]:
         """The spotlights' irradiance on the lit bins `[N]` and its derivatives by pose and free quantities `[P, N]`."""
-        free = self.knowns.free
-        sight = self._sight if not {"eye_radius", "camera_height"} & set(free) else self._look(estimate.scene)
-        profile = estimate.profile
-        here = light(sight, estimate.pose, estimate.scene, profile, roll=roll, half_angle="half_angle" in free)
-        rows = [here.jacobian[: 6 if roll else 5]]
-        for name in free:
-            if name == "half_angle":
-                rows.append(here.jacobian[-1:])
-                continue
-            plus, minus = (
-                self._look(with_value(estimate.scene, name, value(estimate.scene, name) + step))
-                for step in (_STEP, -_STEP)
-            )
-            rows.append(light_by_surface(here, sight, estimate.pose, (plus, minus), _STEP)[None])
-        return here.value, np.concatenate(rows)
+        return spotlight_irradiance(self._sight, estimate, self.knowns, self._pixels[self.lit], self.at.side, roll=roll)
 
-    def _look(self, scene: Scene) -> Sight:
-        return look(scene, self._pixels[self.lit], self.at.side)
+
+def spotlight_irradiance(
+    sight: Sight, estimate: Estimate, knowns: Knowns, pixels: Array, side: int, *, roll: bool
+) -> tuple[Array, Array]:
+    """The spotlights' irradiance on bins `[N]` and its derivatives by pose and free quantities `[P, N]`.
+
+    `sight` is what the bins of `side` px at `pixels` `[N, 2]` see of the nominal surface.
+    """
+    free = knowns.free
+    seen = look(estimate.scene, pixels, side) if {"eye_radius", "camera_height"} & set(free) else sight
+    profile = estimate.profile
+    here = light(seen, estimate.pose, estimate.scene, profile, roll=roll, half_angle="half_angle" in free)
+    rows = [here.jacobian[: 6 if roll else 5]]
+    for name in free:
+        if name == "half_angle":
+            rows.append(here.jacobian[-1:])
+            continue
+        plus, minus = (
+            look(with_value(estimate.scene, name, value(estimate.scene, name) + step), pixels, side)
+            for step in (_STEP, -_STEP)
+        )
+        rows.append(light_by_surface(here, seen, estimate.pose, (plus, minus), _STEP)[None])
+    return here.value, np.concatenate(rows)
