@@ -2,23 +2,31 @@
 
 from __future__ import annotations
 
+import itertools
+import math
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import cv2
 import numpy as np
 
-from campaigns.plan import Case, Group, Plan, Unit, frame_seed, tile_seed
+from campaigns.knowledge import Knowledge
+from campaigns.plan import Case, Group, Plan, Unit, frame_seed, reference_seed, tile_seed, told
 from campaigns.row import Finding, Record
 from campaigns.store import made_with
-from localize import LocalizationFailure, locate
+from localize import ESTIMATORS, Knowns, LocalizationFailure, locate
+from localize.assessment import electrons_of
+from localize.image import AnyImage, Reference
 from localize.outcome import Outcome
+from localize.sequence import AmbientMap
+from localize.theory import cramer_rao
 from scene import Pose
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from render import Exposure, Renderer
+    from render import Exposure, Renderer, Tile
     from scene.sensor import Sensor
 
 #: loading scenes leaks memory in Mitsuba, so a worker that has loaded this many is replaced
@@ -37,6 +45,7 @@ class Bench:
         self._frames = frames
         self._loaded: tuple[str, Renderer, Exposure] | None = None
         self._scenes = 0
+        self._learnt: tuple[str, Reference | None] | None = None
 
     @property
     def worn(self) -> bool:
@@ -53,20 +62,71 @@ class Bench:
             from render import Exposure
 
             exposure = Exposure(background, exposure.sensor)
-        tiles = [renderer.tile(pose, k, tile_seed(self._plan, unit, k)) for k in range(len(group.scene.spotlights))]
+        tiles = self._tiles(renderer, unit)
         findings = []
-        for case in group.cases:
-            image = exposure.frame(tiles, case.scene.power.value, frame_seed(self._plan, unit, case))
-            for localizer in case.localizers:
-                oracle = pose if localizer.endswith("-oracle") else None
-                found = locate(image, case.scene, localizer, oracle=oracle)
-                findings.append(_finding(case, localizer, found))
+        for _, alike in itertools.groupby(group.cases, key=lambda case: case.frame):
+            cases = list(alike)
+            power = cases[0].scene.power.value
+            image = exposure.frame(tiles, power, frame_seed(self._plan, unit, cases[0]))
+            for case in cases:
+                unlit = self._unlit(unit, case, exposure, tiles)
+                bound = self._bound(case, pose)
+                for localizer in case.localizers:
+                    found = self._located(unit, case, image, localizer, unlit)
+                    findings.append(_finding(case, localizer, found, bound if localizer in ESTIMATORS else None))
             if self._frames is not None:
                 radiance = background.copy()
                 for tile in tiles:
-                    radiance[tile.crop.slices] += np.float32(case.scene.power.value) * tile.radiance
-                self._keep(f"{case.key}-{unit.pose:05d}", case, pose, radiance, image)
+                    radiance[tile.crop.slices] += np.float32(power) * tile.radiance
+                self._keep(f"{cases[0].key}-{unit.pose:05d}", cases[0], pose, radiance, image)
         return Record(unit=unit.key, findings=tuple(findings))
+
+    def _located(self, unit: Unit, case: Case, image: AnyImage, localizer: str, unlit: Reference | None) -> Outcome:
+        """What a localizer answers with what the case lets it know."""
+        scene = told(self._plan, unit, case)
+        if localizer in ESTIMATORS:
+            return locate(image, scene, localizer, knowns=knowns(case.knowledge), reference=unlit)
+        oracle = self._plan.groups[unit.group].pose(unit.pose) if localizer.endswith("-oracle") else None
+        return locate(image, scene, localizer, oracle=oracle)
+
+    def _bound(self, case: Case, pose: Pose) -> float | None:
+        """The root mean square error of the tip [mm] that no estimator with the case's knowledge beats."""
+        if not self._plan.campaign.bounds:
+            return None
+        try:
+            return cramer_rao(case.scene, pose, electrons_of(case.scene), knowns(case.knowledge)).position_mm
+        except ValueError:
+            return None
+
+    def _unlit(self, unit: Unit, case: Case, exposure: Exposure, tiles: Sequence[Tile]) -> Reference | None:
+        """The view without spotlights that the case's localizers are given: taken beside the frame, or learnt."""
+        knowledge, power = case.knowledge, case.scene.power.value
+        if knowledge.reference:
+            seeds = [reference_seed(self._plan, unit, case, i) for i in range(knowledge.reference)]
+            return Reference.mean((exposure.dark(tiles, power, seed) for seed in seeds), case.scene)
+        if not knowledge.sequence:
+            return None
+        key = f"{case.frame}-{knowledge.sequence}"
+        if self._learnt is None or self._learnt[0] != key:
+            self._learnt = key, self._learn(unit, case, exposure)
+        return self._learnt[1]
+
+    def _learn(self, unit: Unit, case: Case, exposure: Exposure) -> Reference | None:
+        """What frames of the trajectory show outside their own patches, found without the truth."""
+        group = self._plan.groups[unit.group]
+        renderer = self._scene(group)[0]
+        ambient = AmbientMap(case.scene)
+        count = min(case.knowledge.sequence, len(group.positions))
+        for pose in np.linspace(0, len(group.positions) - 1, count).astype(int):
+            other = Unit(unit.group, int(pose), group.unit(int(pose)))
+            tiles = self._tiles(renderer, other)
+            ambient.add(exposure.frame(tiles, case.scene.power.value, frame_seed(self._plan, other, case)))
+        return ambient.reference()
+
+    def _tiles(self, renderer: Renderer, unit: Unit) -> list[Tile]:
+        group = self._plan.groups[unit.group]
+        pose = group.pose(unit.pose)
+        return [renderer.tile(pose, k, tile_seed(self._plan, unit, k)) for k in range(len(group.scene.spotlights))]
 
     def _scene(self, group: Group) -> tuple[Renderer, Exposure]:
         if self._loaded is None or self._loaded[0] != group.scene_key:
@@ -89,9 +149,7 @@ class Bench:
         alike = [i for i, g in enumerate(self._plan.groups) if g.scene_key == group.scene_key]
         first = self._plan.groups[alike[0]]
         unit = Unit(alike[0], 0, first.unit(0))
-        tiles = [
-            renderer.tile(first.pose(0), k, tile_seed(self._plan, unit, k)) for k in range(len(group.scene.spotlights))
-        ]
+        tiles = self._tiles(renderer, unit)
         brightest = max(case.scene.power.value for i in alike for case in self._plan.groups[i].cases)
         return exposure.metered(tiles, brightest)
 
@@ -106,9 +164,26 @@ class Bench:
         write_preview(self._frames / f"{name}.png", image, case.scene.sensor.full_scale)
 
 
-def _finding(case: Case, localizer: str, found: Outcome) -> Finding:
+def knowns(knowledge: Knowledge) -> Knowns:
+    """What a localizer may assume of the scene that it is told."""
+    angle = knowledge.half_angle_sigma
+    return Knowns(
+        rcm_sigma_mm=knowledge.rcm_sigma,
+        half_angle_sigma_deg=None if angle is None else math.degrees(angle),
+        eye_radius_sigma_mm=knowledge.eye_radius_sigma,
+        camera_height_sigma_mm=knowledge.camera_height_sigma,
+    )
+
+
+def _finding(case: Case, localizer: str, found: Outcome, bound: float | None) -> Finding:
     if isinstance(found, LocalizationFailure):
-        return Finding(case=case.key, localizer=localizer, reason=found.reason[:1000])
-    covariance = None if found.covariance is None else tuple(map(tuple, found.covariance.tolist()))
-    apex, axis = found.apex_mm.tolist(), found.axis.tolist()
-    return Finding(case=case.key, localizer=localizer, apex=apex, axis=axis, covariance=covariance)
+        return Finding(case=case.key, localizer=localizer, reason=found.reason[:1000], bound=bound)
+    return Finding(
+        case=case.key,
+        localizer=localizer,
+        apex=found.apex_mm.tolist(),
+        axis=found.axis.tolist(),
+        roll=found.roll,
+        covariance=None if found.covariance is None else tuple(map(tuple, found.covariance.tolist())),
+        bound=bound,
+    )

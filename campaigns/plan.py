@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import BaseModel
 
+from campaigns.knowledge import Knowledge
 from campaigns.labels import label_columns, swept_columns, without_files
 from campaigns.schema import Campaign, Combination, base, combinations, makes_frames
 from scene import InputError, Pose, Scene
@@ -26,14 +27,17 @@ MAX_ROWS = 1_000_000
 
 @dataclass(frozen=True)
 class Case:
-    """A scene with its power, a trajectory and what localizes its frames.
+    """A scene with its power, a trajectory, what localizes its frames and with what knowledge.
 
-    `labels` are the columns of its rows that say what it is, `swept` those of other keys that are swept.
+    Cases with the same `frame` look at the same images. `labels` are the columns of its rows that say what it is,
+    `swept` those of other keys that are swept.
     """
 
     key: str
+    frame: str
     scene: Scene
     localizers: tuple[str, ...]
+    knowledge: Knowledge
     labels: dict[str, str | float]
     swept: dict[str, str | float]
 
@@ -59,6 +63,11 @@ class Group:
     def unit(self, index: int) -> str:
         """The key of the unit of work that is that pose."""
         return f"{self.key}-{index}"
+
+    @property
+    def frames(self) -> int:
+        """Images that one pose gives: cases that differ in knowledge share theirs."""
+        return len({case.frame for case in self.cases})
 
     @property
     def rows(self) -> int:
@@ -108,7 +117,7 @@ class Plan:
     @property
     def frames(self) -> int:
         """Images that are exposed."""
-        return sum(len(group.positions) * len(group.cases) for group in self.groups)
+        return sum(len(group.positions) * group.frames for group in self.groups)
 
     @property
     def tiles(self) -> int:
@@ -127,8 +136,18 @@ def tile_seed(plan: Plan, unit: Unit, spotlight: int) -> int:
 
 
 def frame_seed(plan: Plan, unit: Unit, case: Case) -> int:
-    """The seed of the sensor's noise in a case's frame, the same for every localizer."""
-    return _seed(plan, case.key, unit.pose)
+    """The seed of the sensor's noise in a case's frame, the same for every localizer and whatever it knows."""
+    return _seed(plan, case.frame, unit.pose)
+
+
+def reference_seed(plan: Plan, unit: Unit, case: Case, number: int) -> int:
+    """The seed of the noise in one of a case's frames without spotlights."""
+    return _seed(plan, case.frame, unit.pose, 1, number)
+
+
+def told(plan: Plan, unit: Unit, case: Case) -> Scene:
+    """The scene as the case's localizers are told it at a unit's pose."""
+    return case.knowledge.told(case.scene, np.random.default_rng([plan.campaign.seed, int(case.frame, 16), unit.pose]))
 
 
 def _seed(plan: Plan, key: str, *numbers: int) -> int:
@@ -141,6 +160,7 @@ class _Draft:
 
     combination: Combination
     group: str
+    frame: str
     localizers: list[str] = field(default_factory=list)
 
 
@@ -154,7 +174,8 @@ def make_plan(document: Document) -> Plan:
         case = combination.campaign
         visited = (case.trajectory, case.poses, case.samples, case.seed)
         group = _address(_at_one_watt(case.scene), *visited)
-        draft = drafts.setdefault(_address(case.scene, *visited), _Draft(combination, group))
+        frame = _address(case.scene, *visited)
+        draft = drafts.setdefault(_address(case.scene, *visited, case.knowledge), _Draft(combination, group, frame))
         new = [name for name in case.localizers if name not in draft.localizers]
         draft.localizers += new
         rows += case.poses * len(new)
@@ -169,15 +190,19 @@ def make_plan(document: Document) -> Plan:
     members: dict[str, list[Case]] = {}
     for i, (key, draft) in enumerate(drafts.items()):
         columns = [{name: values[i] for name, values in table.items()} for table in (labels, swept)]
-        cases.append(Case(key, draft.combination.campaign.scene, tuple(draft.localizers), *columns))
+        chosen = draft.combination.campaign
+        cases.append(Case(key, draft.frame, chosen.scene, tuple(draft.localizers), chosen.knowledge, *columns))
         members.setdefault(draft.group, []).append(cases[-1])
     groups = []
     for key, shared in members.items():
         case = drafts[shared[0].key].combination.campaign
         scene = _at_one_watt(case.scene)
         scene_key = _address(scene, case.samples)
-        groups.append(Group(key, scene_key, scene, case.samples, positions[key], tuple(shared)))
-    parts = [campaign.theory, campaign.frames, sorted((c.key, sorted(c.localizers)) for c in cases)]
+        # cases that look at the same image follow each other, so that it need not be exposed twice
+        first = {c.frame: i for i, c in reversed(list(enumerate(shared)))}
+        alike = tuple(sorted(shared, key=lambda c: first[c.frame]))
+        groups.append(Group(key, scene_key, scene, case.samples, positions[key], alike))
+    parts = [campaign.theory, campaign.frames, campaign.bounds, sorted((c.key, sorted(c.localizers)) for c in cases)]
     return Plan(campaign, tuple(cases), tuple(groups), identity(json.dumps(parts)))
 
 

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import contextlib
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Annotated
 
 import numpy as np
@@ -29,8 +31,10 @@ class Finding(Model):
     reason: str = Field("", max_length=1000)
     apex: Vector | None = None  #: [mm]
     axis: Vector | None = None
+    roll: FiniteFloat | None = None  #: [rad], of localizers that measure it
     #: of the apex [mm], the axis along two tangents [rad] and, with six rows, the roll [rad]
     covariance: Annotated[tuple[tuple[FiniteFloat, ...], ...], Field(min_length=5, max_length=6)] | None = None
+    bound: Annotated[FiniteFloat, Field(ge=0.0)] | None = None  #: root mean square tip error no estimator beats [mm]
 
     @model_validator(mode="after")
     def _whole(self) -> Finding:
@@ -82,16 +86,47 @@ def errors(true: Pose, found: Finding | None, rcm: Vector) -> Row:
     return row
 
 
-def _sigmas(found: Finding | None, most: int) -> Row:
-    """Standard deviations where there is a covariance, else NaN; no columns at all if the largest, `most`, is 0."""
-    covariance = found.covariance if found is not None else None
-    spread = [_NAN] * most
-    for i, row in enumerate(covariance or ()):
-        spread[i] = math.sqrt(max(row[i], 0.0))
-    named: Row = {f"est_sigma_{c}_mm": sigma for c, sigma in zip(_XYZ, spread, strict=False)}
-    if most > 3:
-        named["est_sigma_axis_deg"] = math.degrees(math.hypot(spread[3], spread[4]))
-    return named | ({"est_sigma_roll_deg": math.degrees(spread[5])} if most > 5 else {})
+@dataclass(frozen=True)
+class _Stated:
+    """Which columns the estimators' own statements need: the same in every row of a run."""
+
+    sigmas: int  #: the largest covariance, 0 if there is none
+    roll: bool
+    bound: bool
+
+    @classmethod
+    def among(cls, findings: Iterable[Finding]) -> _Stated:
+        """The columns that these findings fill."""
+        sigmas, roll, bound = 0, False, False
+        for found in findings:
+            sigmas = max(sigmas, len(found.covariance or ()))
+            roll, bound = roll or found.roll is not None, bound or found.bound is not None
+        return cls(sigmas, roll, bound)
+
+    def row(self, true: Pose, found: Finding | None) -> Row:
+        """Standard deviations and how well they hold, roll and bound; NaN where there is none.
+
+        `est_chi2_tip` is the tip's error in units of its own covariance: chi-squared of three degrees if that is right.
+        """
+        row: Row = {}
+        if self.sigmas:
+            spread, chi2 = [_NAN] * self.sigmas, _NAN
+            if found is not None and found.apex is not None and found.covariance is not None:
+                for i, line in enumerate(found.covariance):
+                    spread[i] = math.sqrt(max(line[i], 0.0))
+                error = np.array(found.apex) - true.apex
+                # a covariance that cannot be inverted is one a stranger's journal holds
+                with contextlib.suppress(np.linalg.LinAlgError):
+                    chi2 = float(error @ np.linalg.solve(np.array([line[:3] for line in found.covariance[:3]]), error))
+            row = {f"est_sigma_{c}_mm": sigma for c, sigma in zip(_XYZ, spread, strict=False)}
+            row |= {"est_chi2_tip": chi2, "est_sigma_axis_deg": math.degrees(math.hypot(spread[3], spread[4]))}
+            row |= {"est_sigma_roll_deg": math.degrees(spread[5])} if self.sigmas > 5 else {}
+        if self.roll:
+            off = None if found is None or found.roll is None else math.remainder(found.roll - true.roll, 2.0 * math.pi)
+            row["est_roll_error_deg"] = _NAN if off is None else math.degrees(off)
+        if self.bound:
+            row["est_bound_mm"] = _NAN if found is None or found.bound is None else found.bound
+        return row
 
 
 def rows(plan: Plan, records: Mapping[str, Record]) -> Iterator[Row]:
@@ -99,7 +134,7 @@ def rows(plan: Plan, records: Mapping[str, Record]) -> Iterator[Row]:
 
     The order and every value depend on the campaign alone, not on who finished a unit when.
     """
-    most = max((len(f.covariance or ()) for record in records.values() for f in record.findings), default=0)
+    stated = _Stated.among(f for record in records.values() for f in record.findings)
     homes = {}
     for group in plan.groups:
         first = 0
@@ -118,4 +153,4 @@ def rows(plan: Plan, records: Mapping[str, Record]) -> Iterator[Row]:
                 row: Row = {"case": case.key, **case.labels, "localizer": localizer, "pose": pose}
                 row |= {"status": "failed" if reason else "ok", "reason": reason}
                 row |= errors(group.pose(pose), found, case.scene.instrument.rcm)
-                yield row | _sigmas(found, most) | case.swept
+                yield row | stated.row(group.pose(pose), found) | case.swept

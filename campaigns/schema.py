@@ -15,6 +15,7 @@ from typing import Annotated, Any, Literal
 
 from pydantic import BeforeValidator, Field
 
+from campaigns.knowledge import Knowledge
 from scene import InputError, Scene
 from scene.document import Document, Path_, find_document, merge, read_document, read_value
 from scene.model import Model, unknown_name
@@ -24,8 +25,8 @@ from scene.trajectory import AnyTrajectory, Box
 MAX_COMBINATIONS = 10_000
 #: named in the file by a word alone, which stands for a mapping with this key
 _WORDS = {"scene": "preset", "trajectory": "kind"}
-_FRAMES = ("scene", "trajectory", "poses", "localizers", "samples", "frames", "sweep")
-_SWEPT = ("scene", "trajectory", "poses", "localizers", "samples", "seed")
+_FRAMES = ("scene", "trajectory", "poses", "localizers", "knowledge", "samples", "bounds", "frames", "sweep")
+_SWEPT = ("scene", "trajectory", "poses", "localizers", "knowledge", "samples", "seed")
 
 
 def _known_localizer(value: Any) -> Any:
@@ -55,8 +56,10 @@ class Campaign(Model):
     trajectory: AnyTrajectory = Box()
     poses: int = Field(100, ge=1, le=100_000, strict=True)
     localizers: Annotated[tuple[_Localizer, ...], BeforeValidator(_distinct), Field(min_length=1)] = ("paper",)
+    knowledge: Knowledge = Knowledge()  #: what the localizers are told beside the image
     samples: int = Field(16, ge=1, le=65_536, strict=True)  #: per pixel and rendering
     seed: int = Field(1, ge=0, lt=2**63, strict=True)
+    bounds: bool = Field(False, strict=True)  #: state the Cramer-Rao bound beside what the estimators find
     frames: bool = Field(False, strict=True)  #: keep every frame as EXR and PNG
     made_with: dict[str, str] = Field({})  #: written by a run: versions, Python, platform; means nothing when read
 

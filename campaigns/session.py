@@ -23,7 +23,7 @@ def measure(plan: Plan, store: Store, workers: int) -> Ending:
     left = [u for u in plan.units() if u.key not in store.records or store.records[u.key].error]
     groups = {unit.key: plan.groups[unit.group] for unit in left}
     progress = Progress(
-        sum(len(group.cases) for group in groups.values()), sum(group.work for group in groups.values()), sys.stderr
+        sum(group.frames for group in groups.values()), sum(group.work for group in groups.values()), sys.stderr
     )
     _say_where_it_stands(plan, store, len(left), progress)
     frames = None
@@ -36,7 +36,7 @@ def measure(plan: Plan, store: Store, workers: int) -> Ending:
         for record in crew:
             store.append(record)
             group = groups[record.unit]
-            progress.update(len(group.cases), group.work, sum(bool(f.reason) for f in record.findings))
+            progress.update(group.frames, group.work, sum(bool(f.reason) for f in record.findings))
     except KeyboardInterrupt:
         interrupted = True
     except BaseException:

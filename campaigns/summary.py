@@ -35,13 +35,13 @@ def summary(plan: Plan, workers: int) -> Iterator[str]:
     if len(plan.cases) > _MOST_CASES:
         yield f"  ... and {len(plan.cases) - _MOST_CASES} more"
     yield (
-        f"{plan.tiles} tiles and {plan.scenes} backgrounds are rendered; powers and localizers share them "
+        f"{plan.tiles} tiles and {plan.scenes} backgrounds are rendered; powers, knowledge and localizers share them "
         f"({len(plan.groups)} groups of cases)"
     )
     yield f"about {_duration(_seconds(plan) / workers)} on {workers} workers (on cores like those it was tuned on)"
     yield from _exposures(plan)
     if campaign.frames:
-        size = sum(len(g.positions) * len(g.cases) * 4.0 * g.scene.camera.resolution**2 for g in plan.groups)
+        size = sum(len(g.positions) * g.frames * 4.0 * g.scene.camera.resolution**2 for g in plan.groups)
         yield f"frames take up to {size / 1e9:.1f} GB on the disk"
 
 

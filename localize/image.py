@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
+from dataclasses import dataclass
 from typing import Any
 
 import cv2
@@ -34,6 +36,40 @@ def checked(image: ArrayLike, scene: Scene) -> AnyImage:
     if array.dtype.kind == "f" and not np.isfinite(array).all():
         raise InputError("image: has pixels that are NaN or infinite; mask or repair them first")
     return array
+
+
+@dataclass(frozen=True, eq=False)
+class Reference:
+    """A view without spotlights: `pixels` `[H, W]` or `[H, W, 3]`, 1 is white, the mean of `frames` frames."""
+
+    pixels: NDArray[np.float32]
+    frames: float = 1.0
+
+    @classmethod
+    def of(cls, reference: ArrayLike | Reference, scene: Scene) -> Reference:
+        """A checked reference; a bare image counts as one frame. Raises InputError as `checked` does."""
+        if isinstance(reference, Reference):
+            return cls(np.asarray(checked(reference.pixels, scene), np.float32), reference.frames)
+        image = checked(reference, scene)
+        white = 1.0 if image.dtype.kind == "f" else white_level(image, scene)
+        return cls(image.astype(np.float32) / np.float32(white))
+
+    @classmethod
+    def mean(cls, images: Iterable[AnyImage], scene: Scene) -> Reference:
+        """The mean of several checked frames. Raises InputError for none."""
+        total, count = None, 0
+        for image in images:
+            one = cls.of(image, scene).pixels
+            total = one if total is None else total + one
+            count += 1
+        if total is None:
+            raise InputError("reference: at least one frame is needed")
+        return cls(total / np.float32(count), float(count))
+
+
+def white_level(image: AnyImage, scene: Scene) -> int:
+    """The largest value a pixel of an image of whole numbers can take."""
+    return scene.sensor.full_scale if image.dtype == np.uint16 else 255
 
 
 def grey8(image: AnyImage, scene: Scene) -> NDArray[np.uint8]:

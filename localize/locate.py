@@ -8,7 +8,7 @@ from collections.abc import Callable
 from numpy.typing import ArrayLike
 
 from localize.cone import cone
-from localize.image import AnyImage, checked
+from localize.image import AnyImage, Reference, checked
 from localize.noise import NoiseModel
 from localize.outcome import Outcome
 from localize.photometric import photometric
@@ -28,8 +28,21 @@ LOCALIZERS: dict[str, Localizer] = {
     "cone": lambda image, scene, oracle: cone(image, scene),
     "photometric": lambda image, scene, oracle: photometric(image, scene),
 }
-#: localizers that use what is known beside the image
-ESTIMATORS: dict[str, Callable[..., Outcome]] = {"cone": cone, "photometric": photometric}
+#: localizers that use what is known beside the image: the sigmas, a view without spotlights, the sensor's noise
+Estimator = Callable[[AnyImage, Scene, Knowns | None, Reference | None, NoiseModel | None], Outcome]
+ESTIMATORS: dict[str, Estimator] = {
+    "cone": lambda image, scene, knowns, reference, noise: cone(
+        image, scene, knowns=knowns, reference=reference.pixels if reference else None, noise=noise
+    ),
+    "photometric": lambda image, scene, knowns, reference, noise: photometric(
+        image,
+        scene,
+        knowns=knowns,
+        reference=reference.pixels if reference else None,
+        frames=reference.frames if reference else 1.0,
+        noise=noise,
+    ),
+}
 
 
 def locate(
@@ -39,7 +52,7 @@ def locate(
     *,
     oracle: Pose | None = None,
     knowns: Knowns | None = None,
-    reference: ArrayLike | None = None,
+    reference: ArrayLike | Reference | None = None,
     noise: NoiseModel | None = None,
 ) -> Outcome:
     """Where the instrument is, from one image of its spotlights' patches.
@@ -49,8 +62,9 @@ def locate(
     whose name ends in "-oracle" and refused by all others.
 
     `cone` and `photometric` take more: `knowns` says how well RCM, half angle, eye and camera are known (default: the
-    RCM to 0.05 mm, all else exactly), `reference` is a frame without spotlights, shaped like the image, and `noise`
-    the sensor's noise where it is not the scene's. They answer with a covariance.
+    RCM to 0.05 mm, all else exactly), `reference` is a frame without spotlights, shaped like the image, or a
+    `Reference` averaged over several, and `noise` the sensor's noise where it is not the scene's. They answer with a
+    covariance.
 
     Returns a Localization (`apex_mm [3]`, unit `axis [3]` from the RCM into the light), or a LocalizationFailure,
     which is falsy and has a `reason`. Raises InputError for an unknown localizer, an image that cannot be read or
@@ -65,8 +79,8 @@ def locate(
     if not localizer.endswith("-oracle") and oracle is not None:
         raise InputError(f"localizer '{localizer}' must not see the true pose; leave oracle= out")
     if localizer in ESTIMATORS:
-        dark = None if reference is None else checked(reference, scene)
-        return ESTIMATORS[localizer](checked(image, scene), scene, knowns=knowns, reference=dark, noise=noise)
+        unlit = None if reference is None else Reference.of(reference, scene)
+        return ESTIMATORS[localizer](checked(image, scene), scene, knowns, unlit, noise)
     for name, given in {"knowns": knowns, "reference": reference, "noise": noise}.items():
         if given is not None:
             raise InputError(

@@ -12,6 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from localize.image import Reference, white_level
 from localize.noise import NoiseModel, noise_of
 from localize.outcome import Outcome
 from localize.photometric import photometric
@@ -31,6 +32,7 @@ class AmbientMap:
     def __init__(self, scene: Scene) -> None:
         self._scene = scene
         self._sum: NDArray[np.float32] | None = None
+        self._white = np.float32(1.0)
         side = scene.camera.resolution
         self._count = np.zeros((side, side), np.uint16)
 
@@ -44,6 +46,7 @@ class AmbientMap:
             return False
         if self._sum is None:
             self._sum = np.zeros(image.shape, np.float32)
+            self._white = np.float32(1.0 if image.dtype.kind == "f" else white_level(image, self._scene))
         elif self._sum.shape != image.shape:
             raise InputError(f"sequence: a frame of shape {image.shape} after frames of {self._sum.shape}")
         margin = _MARGIN * float(np.max(np.ptp(points, axis=0))) + 3.0
@@ -57,8 +60,8 @@ class AmbientMap:
         self._count[hidden] -= 1
         return True
 
-    def reference(self) -> tuple[NDArray[np.float32], float] | None:
-        """The ambient view in the frames' pixel values, scaled as they are, and how many frames its pixels average.
+    def reference(self) -> Reference | None:
+        """The ambient view, a mean over as many frames as show the pixels in the median.
 
         Pixels that no frame shows unlit get the median of the others. None if fewer than two frames were added.
         """
@@ -69,7 +72,7 @@ class AmbientMap:
         seen = self._count > 0
         if not seen.all():
             view[~seen] = np.median(view[seen][:: max(1, int(seen.sum()) // 100_000)], axis=0)
-        return view.astype(np.float32), float(np.median(self._count[seen]))
+        return Reference((view / self._white).astype(np.float32), float(np.median(self._count[seen])))
 
 
 @dataclass(frozen=True)
@@ -103,15 +106,6 @@ def locate_sequence(
             outcomes.append(photometric(image, scene, knowns=knowns, noise=sensor))
             continue
         outcomes.append(
-            photometric(
-                image, scene, knowns=knowns, reference=_like(view[0], image, scene), frames=view[1], noise=sensor
-            )
+            photometric(image, scene, knowns=knowns, reference=view.pixels, frames=view.frames, noise=sensor)
         )
     return SequenceResult(tuple(outcomes), learnt)
-
-
-def _like(view: NDArray[np.float32], image: NDArray[np.generic], scene: Scene) -> NDArray[np.float32]:
-    """Pixel values as a float image has them: 1 is white."""
-    if np.issubdtype(image.dtype, np.floating):
-        return view
-    return np.asarray(view / np.float32(255 if image.dtype == np.uint8 else scene.sensor.full_scale), np.float32)

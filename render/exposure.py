@@ -53,6 +53,13 @@ class Exposure:
             image[crop.slices] = encode(radiance, self.sensor)
         return image[..., 0] if image.shape[-1] == 1 else image
 
+    def dark(self, tiles: Sequence[Tile], power_w: float, seed: int = 0) -> NDArray[np.uint8] | NDArray[np.uint16]:
+        """The image without spotlights, at the exposure of the frame with these tiles at `power_w` [W]."""
+        if not isinstance(self.sensor, Emva):
+            return self.frame((), 0.0)
+        lit = [tile for tile in tiles if tile.radiance.size]
+        return self._digital(self._metered(self.sensor, lit, power_w), self._background, seed)
+
     @property
     def meters_once(self) -> bool:
         """Whether the exposure time is still to be set, once and from the campaign's brightest frame, by `metered`."""
@@ -76,15 +83,22 @@ class Exposure:
     def _noisy(
         self, sensor: Emva, lit: Sequence[Tile], power_w: float, seed: int
     ) -> NDArray[np.uint8] | NDArray[np.uint16]:
-        if sensor.metering is not None and sensor.metering.each == "frame":
-            metered = self.metered(lit, power_w)
-            assert isinstance(metered, Emva)
-            sensor = metered
         signal = self._background
         if lit:
             crop, radiance = self._lit(lit, power_w)
             signal = signal.copy()
             signal[crop.slices] = radiance
+        return self._digital(self._metered(sensor, lit, power_w), signal, seed)
+
+    def _metered(self, sensor: Emva, lit: Sequence[Tile], power_w: float) -> Emva:
+        if sensor.metering is None or sensor.metering.each != "frame":
+            return sensor
+        metered = self.metered(lit, power_w)
+        assert isinstance(metered, Emva)
+        return metered
+
+    @staticmethod
+    def _digital(sensor: Emva, signal: NDArray[np.float32], seed: int) -> NDArray[np.uint8] | NDArray[np.uint16]:
         raw = emva.expose(signal, sensor, seed)
         return emva.demosaic(raw) if signal.shape[-1] == 3 else raw
 

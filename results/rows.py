@@ -43,6 +43,13 @@ _NUMBERS = (
     "rotation_error_deg",
     "axis_error_deg",
 )
+#: what estimators state of themselves, where they do: sigmas, the tip's chi-squared, the roll's error, the bound
+STATED = (
+    *(f"est_sigma_{axis}_mm" for axis in "xyz"),
+    "est_chi2_tip",
+    "est_roll_error_deg",
+    "est_bound_mm",
+)
 COLUMNS = ("case", *GROUP, "pose", "status", "reason", *_NUMBERS[3:])
 
 _MAX_BYTES = 500_000_000
@@ -56,7 +63,10 @@ _LOCALIZER = re.compile(r"[\w .+-]{1,60}", re.ASCII)
 
 @dataclass(frozen=True)
 class Rows:
-    """Validated rows. `frame` has the columns `COLUMNS`, then `swept`; numbers are float64, names text."""
+    """Validated rows. `frame` has the columns `COLUMNS`, those of `STATED` that the run has, then `swept`.
+
+    Numbers are float64, names text.
+    """
 
     frame: pd.DataFrame
     swept: tuple[str, ...] = ()
@@ -78,8 +88,8 @@ def find_rows(folder: Path) -> Path | None:
 def read_rows(path: Path, swept: Iterable[str] = ()) -> Rows:
     """Rows from a parquet or CSV file.
 
-    A column beyond the known ones belongs to a swept key if its name is a dotted path or stands in `swept`; columns
-    that begin with `est_` are the estimator's own and left alone. Raises InputError for a file that cannot be read,
+    A column beyond the known ones belongs to a swept key if its name is a dotted path or stands in `swept`; other
+    columns that begin with `est_` are the estimator's own and left alone. Raises InputError for a file that cannot be read,
     is too large, lacks a column, has another one, or holds values of the wrong type or out of bounds.
     """
     keys = tuple(swept)
@@ -97,6 +107,8 @@ def read_rows(path: Path, swept: Iterable[str] = ()) -> Rows:
     data: dict[str, pd.Series] = {}
     for name in COLUMNS:
         data[name] = text_column(table, name, path) if name in _TEXT else number_column(table, name, path)
+    for name in (name for name in STATED if name in table.column_names):
+        data[name] = number_column(table, name, path)
     for name in extra:
         data[name] = _swept_column(table, name, path)
     rows = Rows(pd.DataFrame(data), tuple(extra))

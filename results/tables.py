@@ -12,6 +12,7 @@ from typing import Any, NamedTuple
 import pandas as pd
 
 from results.assumptions import assumptions, both_conventions, scene_of, theory_assumptions
+from results.precision import precision_table
 from results.published import (
     BOTH,
     NOTES,
@@ -45,7 +46,7 @@ _Maker = Callable[[Run, Variant, _Boxes], tuple[_Records, Block] | None]
 
 
 def make_tables(run: Run, boxes: pd.DataFrame | None) -> list[Table]:
-    """Every table that the run has rows for: I, IV, V, and the errors by power."""
+    """Every table that the run has rows for: I, IV, V, the errors by power, and precision."""
     made = [_table_1(run)]
     if run.rows is not None and boxes is not None:
         parts = [(variant, _indexed(part)) for variant, part in split(boxes, run.rows.group)]
@@ -55,7 +56,10 @@ def make_tables(run: Run, boxes: pd.DataFrame | None) -> list[Table]:
         made.append(
             _collect("table_5", "Table V: errors on the deformed retina", NOTES["Table V"], _table_5, run, parts)
         )
-        made.append(_collect("power", "Errors by light power", NOTES["Figs. 10, 11"], _by_power, run, parts))
+        precise = precision_table(run)
+        if precise is None or run.rows.frame["power_w"].nunique() > 1:
+            made.append(_collect("power", "Errors by light power", NOTES["Figs. 10, 11"], _by_power, run, parts))
+        made.append(precise)
     return [table for table in made if table is not None]
 
 

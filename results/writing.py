@@ -14,7 +14,7 @@ from scene import InputError
 from scene.atomic import write_atomically
 
 _OURS = {
-    "tables": re.compile(r"(table_\d+|power)\.csv|tables\.(txt|md)"),
+    "tables": re.compile(r"(table_\d+|power|precision)\.csv|tables\.(txt|md)"),
     "figures": re.compile(r"(figure_\d+|along|power)_.+\.(png|svg)"),
 }
 _SUMMARY = "tables.txt"

@@ -120,3 +120,14 @@ class TabulatedBeam(Model):
 
 
 Beam = Annotated[HardBeam | CyclesBeam | LinearBeam | TabulatedBeam, Field(discriminator="kind")]
+
+
+def stretched(beam: Beam, half_angle: float) -> Beam:
+    """The same profile over another half angle [rad]: every angle grows in proportion (in the cosine for `cycles`)."""
+    if isinstance(beam, TabulatedBeam):
+        angles = tuple(a * half_angle / beam.half_angle for a in beam.angles)
+        return beam.model_copy(update={"angles": angles})
+    update = {"half_angle": half_angle}
+    if isinstance(beam, LinearBeam):
+        update["beam_width"] = beam.beam_width * half_angle / beam.half_angle
+    return beam.model_copy(update=update)

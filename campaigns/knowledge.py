@@ -1,0 +1,86 @@
+"""What a campaign tells its localizers beside the image: the scene, how wrong, how well known, and unlit frames.
+
+The renderer has the true scene. A localizer is told one whose quantities carry errors drawn anew for every pose, the
+sigmas it may assume, and perhaps a reference. None of it is the pose.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Annotated, Any
+
+import numpy as np
+from pydantic import BeforeValidator, Field, PlainSerializer, model_validator
+
+from scene import Scene
+from scene.beam import stretched
+from scene.model import Model
+from scene.quantity import Angle, Length, format_quantity
+from scene.surface import AnySurface
+
+FREE = "free"
+
+
+def _sigma(kind: str, quantity: Any) -> Any:
+    """A sigma of that kind of quantity, or `free`."""
+    return Annotated[
+        Annotated[quantity, Field(ge=0.0)] | None,
+        BeforeValidator(lambda value: None if value == FREE else value),
+        PlainSerializer(lambda v: FREE if v is None else format_quantity(v, kind), when_used="json"),
+    ]
+
+
+if TYPE_CHECKING:
+    LengthSigma = float | None
+    AngleSigma = float | None
+else:
+    LengthSigma = _sigma("length", Length)  #: [mm], None if free
+    AngleSigma = _sigma("angle", Angle)  #: [rad], None if free
+
+
+class Knowledge(Model):
+    """Errors (standard deviations of what is told) and sigmas (what a localizer may assume); `free` is not known.
+
+    `rcm` is in mm along each axis, the others are in their own unit. `surface` is what the localizers are told in
+    place of the true one. `reference` is how many frames without spotlights they are given, averaged; `sequence` from
+    how many of the trajectory's own frames, evenly spread, they learn the same view.
+    """
+
+    rcm_error: Length = Field(0.0, ge=0.0)
+    rcm_sigma: LengthSigma = 0.05
+    half_angle_error: Angle = Field(0.0, ge=0.0)
+    half_angle_sigma: AngleSigma = 0.0
+    eye_radius_error: Length = Field(0.0, ge=0.0)
+    eye_radius_sigma: LengthSigma = 0.0
+    camera_height_error: Length = Field(0.0, ge=0.0)
+    camera_height_sigma: LengthSigma = 0.0
+    surface: AnySurface | None = None
+    reference: int = Field(0, ge=0, le=1000, strict=True)
+    sequence: int = Field(0, ge=0, le=1000, strict=True)
+
+    @model_validator(mode="after")
+    def _one_view(self) -> Knowledge:
+        if self.reference and self.sequence:
+            raise ValueError("give either reference or sequence: both are the view without spotlights")
+        if self.sequence == 1:
+            raise ValueError("sequence must be at least 2: one frame hides what its own patch covers")
+        return self
+
+    def told(self, scene: Scene, rng: np.random.Generator) -> Scene:
+        """The scene as a localizer is told it at one pose."""
+        # always the same draws, so that one quantity's error does not change another's
+        rcm, others = rng.standard_normal(3), rng.standard_normal(3)
+        update: dict[str, Any] = {}
+        if self.rcm_error:
+            told = np.asarray(scene.instrument.rcm) + self.rcm_error * rcm
+            update["instrument"] = scene.instrument.model_copy(update={"rcm": tuple(map(float, told))})
+        if self.half_angle_error:
+            update["beam"] = stretched(scene.beam, scene.beam.half_angle + self.half_angle_error * float(others[0]))
+        if self.eye_radius_error:
+            radius = scene.eye.radius + self.eye_radius_error * float(others[1])
+            update["eye"] = scene.eye.model_copy(update={"radius": radius})
+        if self.camera_height_error:
+            height = scene.camera.height + self.camera_height_error * float(others[2])
+            update["camera"] = scene.camera.model_copy(update={"height": height})
+        if self.surface is not None:
+            update["surface"] = self.surface
+        return scene.model_copy(update=update)
