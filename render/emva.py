@@ -6,18 +6,23 @@ always starts at the frame's first column, so a crop repeats exactly what the fu
 
 from __future__ import annotations
 
+import functools
+import math
 from typing import Any
 
 import cv2
 import numpy as np
 from numpy.typing import NDArray
-from scipy.special import ndtr
+from scipy.special import ndtri, pdtr, pdtrc
 
 from scene.emva import Emva
 
 #: below this mean [e-] the Poisson distribution is inverted exactly; above, its skewness-corrected normal form is
 #: within 0.2 % of a standard deviation
 _EXACT_BELOW = 30.0
+#: the inversion is tabulated at means of 2^-12 e- on, so many an octave, and interpolated; below nothing is counted
+_FAINTEST = -12.0
+_PER_OCTAVE = 64
 #: rows worked on at once: bounds the memory
 _BAND = 128
 
@@ -74,26 +79,51 @@ def poisson(mean: NDArray[np.float32], normal: NDArray[np.float32]) -> NDArray[n
     """Poisson counts of `mean` as the quantiles that standard normal deviates stand for, any shape."""
     skewed = mean + np.sqrt(mean) * normal + (normal * normal - 1.0) / 6.0
     counts = np.maximum(np.rint(skewed), 0.0).astype(np.float32)
-    low = mean < _EXACT_BELOW
-    if np.any(low):
-        counts[low] = _inverted(mean[low].astype(np.float64), ndtr(normal[low].astype(np.float64)))
+    low = np.flatnonzero(mean < _EXACT_BELOW)
+    if len(low):
+        counts.ravel()[low] = _inverted(mean.ravel()[low], normal.ravel()[low], counts.ravel()[low])
     return counts
 
 
-def _inverted(mean: NDArray[np.float64], uniform: NDArray[np.float64]) -> NDArray[np.float64]:
-    """The smallest counts whose cumulative Poisson probability reaches `uniform`."""
-    counts = np.zeros(mean.shape)
-    term = np.exp(-mean)
-    cumulative = term.copy()
-    open_ = np.flatnonzero(cumulative < uniform)
-    k = 0
-    while len(open_) and k < 200:
-        k += 1
-        term[open_] *= mean[open_] / k
-        cumulative[open_] += term[open_]
-        counts[open_] = k
-        open_ = open_[cumulative[open_] < uniform[open_]]
-    return counts
+def _inverted(mean: NDArray[np.float32], normal: NDArray[np.float32], near: NDArray[np.float32]) -> NDArray[np.int64]:
+    """The smallest counts `[N]` whose cumulative Poisson probability reaches that of the deviates; `near` them."""
+    table = _thresholds()
+    count = np.minimum(near, table.shape[1] - 2).astype(np.int64)
+    octave = np.log2(np.maximum(mean, np.float32(2.0**_FAINTEST)))
+    position = (octave - np.float32(_FAINTEST)) * np.float32(_PER_OCTAVE)
+    row = position.astype(np.int64)
+    share = position - row
+    first = row * table.shape[1]
+    flat = table.ravel()
+
+    def threshold(at: NDArray[np.int64], k: NDArray[np.int64]) -> NDArray[np.float32]:
+        low = first[at] + k
+        return flat[low] + share[at] * (flat[low + table.shape[1]] - flat[low])
+
+    open_ = np.arange(len(count))
+    while len(open_):  # up to where the threshold is reached
+        k = count[open_]
+        open_ = open_[(normal[open_] > threshold(open_, k)) & (k < table.shape[1] - 2)]
+        count[open_] += 1
+    open_ = np.flatnonzero(count > 0)
+    while len(open_):  # and down while the one below reaches it too
+        open_ = open_[normal[open_] <= threshold(open_, count[open_] - 1)]
+        count[open_] -= 1
+        open_ = open_[count[open_] > 0]
+    count[mean < 2.0**_FAINTEST] = 0
+    return count
+
+
+@functools.cache
+def _thresholds() -> NDArray[np.float32]:
+    """The largest deviate that stands for at most k electrons, for means of up to `_EXACT_BELOW` `[means, k]`."""
+    octaves = math.log2(_EXACT_BELOW) - _FAINTEST
+    means = 2.0 ** (_FAINTEST + np.arange(math.ceil(octaves * _PER_OCTAVE) + 2)[:, None] / _PER_OCTAVE)
+    counts = np.arange(100)
+    # the upper tail keeps its digits where the cumulative probability is rounded to 1
+    below, above = pdtr(counts, means), pdtrc(counts, means)
+    z = np.where(below < 0.5, ndtri(below), -ndtri(above))
+    return np.asarray(np.clip(z, -40.0, 40.0), np.float32)
 
 
 def metered_time(lit: NDArray[np.float32], sensor: Emva) -> float:

@@ -78,7 +78,7 @@ def test_electrons_follow_the_standard_s_photon_count():
     assert efficiency == pytest.approx(0.45, abs=0.02)  # the trace's 45 % near 555 nm
 
 
-@pytest.mark.parametrize("mean", [0.3, 4.0, 29.0, 31.0, 300.0])
+@pytest.mark.parametrize("mean", [0.003, 0.3, 4.0, 29.0, 31.0, 300.0])
 def test_counts_are_poisson(mean):
     """Frequencies of 400,000 counts; against the exact distribution's cumulative one; Kolmogorov distance < 0.004."""
     normal, _ = normal_pairs(7, 0, 0, (400, 1000))
