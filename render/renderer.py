@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from render import emitters, kernel, shaft, spectral
+from render.edge import edge_pixels
 from render.tile import Crop, Tile
 from render.view import View
 from scene import Pose, Scene
@@ -31,15 +32,18 @@ class Renderer:
     """Renders radiance: spotlight tiles at 1 W, and the background without spotlights.
 
     Light adds up and is linear in power, so a frame at any power is background + power * sum of tiles; the scene's
-    own power value plays no part here, its convention does. `samples` a pixel are stratified over the pixel's area.
+    own power value plays no part here, its convention does. `samples` a pixel are stratified over the pixel's area;
+    pixels on a patch's hard edge, which need many more than any other, get `edge_samples` if that is not 0.
     Channels are those of the scene's sensor, in W m-2 sr-1 (or A m-2 sr-1 for an EMVA 1288 camera), or `responses`.
     Interreflection adds to the spotlights alone; the microscope's light comes in from outside and is seen once.
     Raises KernelError if Mitsuba cannot be used.
     """
 
-    def __init__(self, scene: Scene, *, samples: int = 16, responses: dict[str, Curve] | None = None) -> None:
+    def __init__(
+        self, scene: Scene, *, samples: int = 16, edge_samples: int = 0, responses: dict[str, Curve] | None = None
+    ) -> None:
         self.scene = scene
-        self.samples = samples
+        self.samples, self.edge_samples = samples, edge_samples
         self.rendered = 0  #: tiles and backgrounds rendered so far
         self._mi, _, self._kernel = kernel.load()
         self._shaft = scene.instrument.shaft
@@ -61,7 +65,12 @@ class Renderer:
         if self._shaft is not None:
             self._lit.update(shaft.placed(self._mi, self._shaft, pose))
         self.rendered += 1
-        return Tile(crop, self._lit.render(crop, self.samples, seed))
+        radiance = self._lit.render(crop, self.samples, seed)
+        if self.edge_samples > self.samples and radiance.size:
+            pixels = crop.pixels(n)
+            edge = np.isin(pixels, edge_pixels(self.scene, pose, spotlight))
+            radiance[edge.reshape(crop.height, crop.width)] = self._lit.pixels(pixels[edge], self.edge_samples, seed)
+        return Tile(crop, radiance)
 
     def footprint(self, pose: Pose, spotlight: int) -> Crop:
         """The pixels a spotlight can reach: its cone's outline, moved along the rays by what bumps may add or hide."""

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,6 +24,28 @@ class Crop:
         low = np.clip(np.floor(pixels.min(axis=0) - margin), 0, resolution).astype(int)
         high = np.clip(np.ceil(pixels.max(axis=0) + margin), 0, resolution).astype(int)
         return cls(int(low[1]), int(low[0]), int(high[1] - low[1]), int(high[0] - low[0]))
+
+    @classmethod
+    def covering(cls, pixels: NDArray[np.uint32], resolution: int) -> Iterator[Crop]:
+        """Rectangles that make up the pixels `[N]` (row * resolution + column, ascending)."""
+        row, column = np.divmod(pixels.astype(int), resolution)
+        starts = np.flatnonzero((np.diff(column, prepend=-2) != 1) | (np.diff(row, prepend=-1) != 0))
+        grown: Crop | None = None
+        for start, end in zip(starts, [*starts[1:], len(pixels)], strict=True):
+            run = cls(int(row[start]), int(column[start]), 1, int(end - start))
+            if grown and (grown.row + grown.height, grown.column, grown.width) == (run.row, run.column, run.width):
+                grown = replace(grown, height=grown.height + 1)
+                continue
+            if grown:
+                yield grown
+            grown = run
+        if grown:
+            yield grown
+
+    def pixels(self, resolution: int) -> NDArray[np.uint32]:
+        """Its pixels `[height * width]`, each row * resolution + column, ascending."""
+        rows, columns = (np.arange(s.start, s.stop, dtype=np.uint32) for s in self.slices)
+        return (rows[:, None] * np.uint32(resolution) + columns).ravel()
 
     @property
     def slices(self) -> tuple[slice, slice]:
