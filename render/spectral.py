@@ -15,6 +15,7 @@ from scene import Scene, fundus
 from scene.emva import Emva
 from scene.illumination import Light
 from scene.retina import Fundus, FundusSite
+from scene.sensor import Linear
 from scene.spectrum import Curve
 
 #: up to this many points a spectrum is given to Mitsuba as it is
@@ -44,11 +45,11 @@ def has_water(scene: Scene) -> bool:
 def channels(scene: Scene, light: Light, responses: dict[str, Curve] | None = None) -> tuple[Channel, ...]:
     """The channels of the scene's sensor (or of `responses`) under a light, in the order of their names' table.
 
-    `srgb8` and `linear` have one with response 1: radiance integrated over wavelength.
+    `linear` and a grey `srgb8` have one with response 1: radiance integrated over wavelength.
     """
     spectrum = light.spectrum
     wide = Curve(np.array([300.0, 1100.0]), np.ones(2))
-    if responses is None and isinstance(scene.sensor, Emva):
+    if responses is None and not isinstance(scene.sensor, Linear):
         responses = scene.sensor.responses
     found = []
     for name, response in (responses or {"radiance": wide}).items():

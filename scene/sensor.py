@@ -4,25 +4,43 @@ from __future__ import annotations
 
 from typing import Annotated, Literal
 
+import numpy as np
 from pydantic import Field
 
 from scene.emva import EMVA_PRESETS, Emva
 from scene.model import Model, named
 from scene.quantity import Radiance
+from scene.spectrum import Curve
 
 _White = Annotated[Radiance, Field(gt=0.0)]
 
 
+#: thirds of the visible range as a renderer of three colours takes them: a flat band shows equally in all
+_THIRDS = {"red": (600.0, 700.0), "green": (500.0, 600.0), "blue": (400.0, 500.0)}
+
+
 class Srgb8(Model):
-    """Eight bits with the sRGB transfer; radiance `white` and above is 255 (Blender's display frame)."""
+    """Eight bits with the sRGB transfer; radiance `white` and above is 255 (Blender's display frame).
+
+    One grey channel; with `colour` red, green and blue, each the radiance of a third of 400 to 700 nm times three, so
+    that a grey retina in flat white light shows the same in all of them.
+    """
 
     kind: Literal["srgb8"] = "srgb8"
     white: _White = 1.0
+    colour: bool = Field(False, strict=True)
 
     @property
     def full_scale(self) -> int:
         """Largest pixel value."""
         return 255
+
+    @property
+    def responses(self) -> dict[str, Curve] | None:
+        """Relative response of each channel; None for the grey one, which weighs all light alike."""
+        if not self.colour:
+            return None
+        return {name: Curve(np.array(band), np.full(2, 3.0)) for name, band in _THIRDS.items()}
 
 
 class Linear(Model):
@@ -39,7 +57,12 @@ class Linear(Model):
 
 
 AnySensor = Srgb8 | Linear | Emva
-SENSORS: dict[str, AnySensor] = {"srgb8": Srgb8(), "linear": Linear(), **EMVA_PRESETS}
+SENSORS: dict[str, AnySensor] = {
+    "srgb8": Srgb8(),
+    "srgb8-colour": Srgb8(colour=True),
+    "linear": Linear(),
+    **EMVA_PRESETS,
+}
 
 
 def sensor_name(sensor: AnySensor) -> str:

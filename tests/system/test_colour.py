@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from render import Exposure, Renderer
 from render.colour import colour_preview, observer, render_xyz, to_srgb
 from render.frame_file import frame_header
 from scene import Camera, Scene
@@ -59,3 +60,25 @@ def test_a_frame_s_header_carries_response_curves_and_the_light():
     assert float(pairs["550"]) == pytest.approx(float(scene.sensor.responses["green"](550.0)), rel=1e-5)
     light = dict(pair.split(":") for pair in str(header["conespot.light"]).split())
     assert float(light["450"]) == pytest.approx(float(scene.illumination.spectrum(450.0)), rel=1e-5)
+
+
+def test_a_grey_retina_in_flat_white_light_shows_alike_in_red_green_and_blue():
+    """Tile and background of the three channels against the grey sensor's one, in sum; 1.5 %, four times the noise."""
+    scene = Scene(camera=Camera(resolution=300), retina=UniformRetina(albedo=0.1))
+    pose = scene.pose(np.array([0.5, 0.5, 4.0]))
+    seen = []
+    for sensor in ("srgb8", "srgb8-colour"):
+        renderer = Renderer(Scene(**{**dict(scene), "sensor": sensor}), samples=16)
+        seen.append((renderer.tile(pose, 0, seed=1).radiance, renderer.background()))
+    for grey, colours in zip(*seen, strict=True):
+        assert colours.shape[-1] == 3
+        lit = grey[..., 0] > 0.2 * grey.max()
+        assert colours[lit].sum(axis=0) / grey[lit].sum() == pytest.approx([1.0] * 3, rel=0.015)
+
+
+def test_a_living_fundus_is_red_before_it_is_green_or_blue():
+    scene = Scene(camera=Camera(resolution=200), retina="fundus", sensor="srgb8-colour")
+    image = Exposure(Renderer(scene, samples=16).background(), scene.sensor).frame((), 0.0)
+    red, green, blue = np.median(image.reshape(-1, 3), axis=0)
+    assert image.shape == (200, 200, 3)
+    assert red > green > blue
