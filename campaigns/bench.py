@@ -133,7 +133,7 @@ class Bench:
             from render import Exposure, Renderer
 
             self._loaded = None  # the old scene goes before the new one comes
-            renderer = Renderer(group.scene, samples=group.samples)
+            renderer = Renderer(group.scene, samples=group.samples, edge_samples=group.edge_samples)
             exposure = Exposure(renderer.background(), group.scene.sensor)
             if exposure.meters_once:
                 exposure = Exposure(renderer.background(), self._metered(group, renderer, exposure))

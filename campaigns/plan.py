@@ -53,6 +53,7 @@ class Group:
     scene_key: str
     scene: Scene
     samples: int
+    edge_samples: int
     positions: NDArray[np.float64]
     cases: tuple[Case, ...]
 
@@ -172,7 +173,7 @@ def make_plan(document: Document) -> Plan:
     rows = 0
     for combination in combinations(document) if makes_frames(document) else ():
         case = combination.campaign
-        visited = (case.trajectory, case.poses, case.samples, case.seed)
+        visited = (case.trajectory, case.poses, case.samples, case.edge_samples, case.seed)
         group = _address(_at_one_watt(case.scene), *visited)
         frame = _address(case.scene, *visited)
         draft = drafts.setdefault(_address(case.scene, *visited, case.knowledge), _Draft(combination, group, frame))
@@ -197,11 +198,11 @@ def make_plan(document: Document) -> Plan:
     for key, shared in members.items():
         case = drafts[shared[0].key].combination.campaign
         scene = _at_one_watt(case.scene)
-        scene_key = _address(scene, case.samples)
+        samples = case.samples, case.edge_samples
         # cases that look at the same image follow each other, so that it need not be exposed twice
         first = {c.frame: i for i, c in reversed(list(enumerate(shared)))}
         alike = tuple(sorted(shared, key=lambda c: first[c.frame]))
-        groups.append(Group(key, scene_key, scene, case.samples, positions[key], alike))
+        groups.append(Group(key, _address(scene, *samples), scene, *samples, positions[key], alike))
     parts = [campaign.theory, campaign.frames, campaign.bounds, sorted((c.key, sorted(c.localizers)) for c in cases)]
     return Plan(campaign, tuple(cases), tuple(groups), identity(json.dumps(parts)))
 
@@ -225,7 +226,7 @@ def _positions(combination: Combination) -> NDArray[np.float64]:
     try:
         positions = case.trajectory.positions(case.poses, np.random.default_rng([case.seed, key]))
     except ValueError as error:
-        raise InputError(f"{place}: {error}") from None
+    depth = scene.depth(positions)
     depth = scene.eye.radius - scene.surface.relief - np.linalg.norm(positions - scene.eye.centre, axis=-1)
     to_rcm = np.linalg.norm(positions - np.asarray(scene.instrument.rcm), axis=-1)
     for i in np.flatnonzero(~((depth > 0.0) & (to_rcm > 0.0))):  # the others need no closer look

@@ -25,8 +25,9 @@ from scene.trajectory import AnyTrajectory, Box
 MAX_COMBINATIONS = 10_000
 #: named in the file by a word alone, which stands for a mapping with this key
 _WORDS = {"scene": "preset", "trajectory": "kind"}
-_FRAMES = ("scene", "trajectory", "poses", "localizers", "knowledge", "samples", "bounds", "frames", "sweep")
-_SWEPT = ("scene", "trajectory", "poses", "localizers", "knowledge", "samples", "seed")
+_CASE = ("scene", "trajectory", "poses", "localizers", "knowledge", "samples", "edge_samples")
+_FRAMES = (*_CASE, "bounds", "frames", "sweep")
+_SWEPT = (*_CASE, "seed")
 
 
 def _known_localizer(value: Any) -> Any:
@@ -58,6 +59,7 @@ class Campaign(Model):
     localizers: Annotated[tuple[_Localizer, ...], BeforeValidator(_distinct), Field(min_length=1)] = ("paper",)
     knowledge: Knowledge = Knowledge()  #: what the localizers are told beside the image
     samples: int = Field(16, ge=1, le=65_536, strict=True)  #: per pixel and rendering
+    edge_samples: int = Field(0, ge=0, le=65_536, strict=True)  #: where a beam is steep, if more than `samples`
     seed: int = Field(1, ge=0, lt=2**63, strict=True)
     bounds: bool = Field(False, strict=True)  #: state the Cramer-Rao bound beside what the estimators find
     frames: bool = Field(False, strict=True)  #: keep every frame as EXR and PNG

@@ -8,8 +8,9 @@ from collections.abc import Iterator
 import numpy as np
 from numpy.typing import NDArray
 
-from campaigns.plan import Case, Plan
-from scene import Pose, Scene
+from campaigns.plan import Case, Group, Plan
+from render.edge import edge_pixels
+from scene import Pose
 from scene.exposure_limits import RetinalExposure, scene_exposure
 
 #: measured on one core: samples traced [1/s], and seconds a pixel to expose and localize a frame once
@@ -77,15 +78,9 @@ def _seconds(plan: Plan) -> float:
             seen.add(group.scene_key)
             total += 3.0 + 4.0 * pixels / RAYS_PER_SECOND
         poses = len(group.positions)
-        tile = np.mean(
-            [
-                _tile_pixels(group.scene, group.pose(int(i)), k)
-                for i in _spread(poses, 5)
-                for k in range(len(group.scene.spotlights))
-            ]
-        )
-        rays = float(tile) * len(group.scene.spotlights) * group.samples
-        total += poses * (rays / RAYS_PER_SECOND + group.rows * pixels * SECONDS_PER_PIXEL)
+        spotlights = range(len(group.scene.spotlights))
+        rays = [sum(_tile_rays(group, group.pose(int(i)), k) for k in spotlights) for i in _spread(poses, 5)]
+        total += poses * (float(np.mean(rays)) / RAYS_PER_SECOND + group.rows * pixels * SECONDS_PER_PIXEL)
     return total
 
 
@@ -94,11 +89,15 @@ def _spread(count: int, most: int) -> NDArray[np.int_]:
     return np.unique(np.linspace(0, count - 1, most).astype(int))
 
 
-def _tile_pixels(scene: Scene, pose: Pose, spotlight: int) -> float:
-    """Pixels of the rectangle that holds a spotlight's patch."""
+def _tile_rays(group: Group, pose: Pose, spotlight: int) -> float:
+    """Samples traced for the rectangle that holds a spotlight's patch, and for its edge."""
+    scene = group.scene
     edge = scene.camera.project(scene.outline(pose, spotlight, points=32))
     inside = np.clip(edge, 0.0, scene.camera.resolution)
-    return float(np.prod(np.ptp(inside, axis=0)))
+    rays = float(np.prod(np.ptp(inside, axis=0))) * group.samples
+    if group.edge_samples > group.samples:
+        rays += len(edge_pixels(scene, pose, spotlight)) * group.edge_samples
+    return rays
 
 
 def _duration(seconds: float) -> str:

@@ -152,3 +152,17 @@ def test_the_summary_states_both_power_conventions_and_the_renderings():
     assert "1 W isotropic = 3.078 mW flux" in text
     assert "80 tiles and 2 backgrounds are rendered" in text
     assert "280 frames, 560 localizations" in text
+
+
+def test_edge_samples_are_rendered_apart_and_are_counted_as_work_where_the_beam_is_hard(plan):
+    """Groups and the stated time with 0 and 65,536 samples on the edge, of a hard and of a soft beam."""
+    text = "scene: paper\nposes: 4\nedge_samples: {}\nsweep: {{scene.beam: [{{kind: {}}}]}}\n"
+    stated = {}
+    for kind in ("hard", "cycles"):
+        plain, fine = (plan(text.format(n, kind)) for n in (0, 65536))
+        assert [g.edge_samples for g in (*plain.groups, *fine.groups)] == [0, 65536]
+        assert plain.groups[0].scene_key != fine.groups[0].scene_key
+        assert tile_seed(plain, next(plain.units()), 0) != tile_seed(fine, next(fine.units()), 0)
+        stated[kind] = [next(line for line in summary(p, 1) if line.startswith("about")) for p in (plain, fine)]
+    assert stated["cycles"][0] == stated["cycles"][1]
+    assert stated["hard"][0] != stated["hard"][1]
