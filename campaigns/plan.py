@@ -226,8 +226,8 @@ def _positions(combination: Combination) -> NDArray[np.float64]:
     try:
         positions = case.trajectory.positions(case.poses, np.random.default_rng([case.seed, key]))
     except ValueError as error:
+        raise InputError(f"{place}: {error}") from None
     depth = scene.depth(positions)
-    depth = scene.eye.radius - scene.surface.relief - np.linalg.norm(positions - scene.eye.centre, axis=-1)
     to_rcm = np.linalg.norm(positions - np.asarray(scene.instrument.rcm), axis=-1)
     for i in np.flatnonzero(~((depth > 0.0) & (to_rcm > 0.0))):  # the others need no closer look
         try:

@@ -84,7 +84,7 @@ def look(scene: Scene, pixels: Array, side: float = 1.0) -> Sight:
     d[:, 0] = (pixels[:, 0] - half) / f
     d[:, 1] = (half - pixels[:, 1]) / f
     d[:, 2] = -1.0
-    if scene.surface.bumps:
+    if not scene.surface.is_sphere:
         unit = d / np.linalg.norm(d, axis=1, keepdims=True)
         points = scene.surface.intersect(eye, camera.centre, unit)
         outward = points - eye.centre

@@ -20,20 +20,16 @@ def arc_extent(scene: Scene) -> float:
     n = scene.camera.resolution
     along = np.linspace(0.0, n, 33)
     border = np.concatenate([[(t, 0.0), (t, n), (0.0, t), (n, t)] for t in along])
-    hits = scene.eye.intersect(scene.camera.centre, scene.camera.back_project(border))
+    points = scene.surface.intersect(scene.eye, scene.camera.centre, scene.camera.back_project(border))
     limit = scene.eye.radius * math.pi / 2.0
-    if np.any(np.isnan(hits)):
+    if np.any(np.isnan(points)):
         return limit
-    points = scene.camera.centre + hits[:, None] * scene.camera.back_project(border)
     return float(min(1.02 * np.max(np.abs(to_arc(scene, points))) + scene.surface.relief, limit))
 
 
 def to_arc(scene: Scene, points: NDArray[np.float64]) -> NDArray[np.float64]:
     """Arc coordinates `[..., 2]` [mm] of points `[..., 3]`: azimuthal equidistant about the posterior pole."""
-    offset = points - scene.eye.centre
-    rho = np.hypot(offset[..., 0], offset[..., 1])
-    arc = scene.eye.radius * np.arctan2(rho, -offset[..., 2])
-    return offset[..., :2] * (arc / np.where(rho > 0.0, rho, 1.0))[..., None]
+    return scene.eye.arc(points - scene.eye.centre)
 
 
 def from_arc(scene: Scene, arc: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -44,7 +40,7 @@ def from_arc(scene: Scene, arc: NDArray[np.float64]) -> NDArray[np.float64]:
 
 
 def retina_mesh(mi: Any, scene: Scene, bsdf: Any) -> Any:
-    """The Mitsuba mesh of the visible retina: bumps displaced, normals from the surface's closed form."""
+    """The Mitsuba mesh of the visible retina: on the surface, with its exact normals."""
     extent = arc_extent(scene)
     n = math.ceil(2.0 * extent / EDGE) + 1
     ticks = np.linspace(-extent, extent, n)

@@ -46,8 +46,8 @@ def shaft_crop(scene: Scene, shaft: Shaft, pose: Pose) -> Crop:
         far = end + (far - end) * (top - end[2]) / (far[2] - end[2])
     rim = shaft.diameter / 2.0 * np.array([(x, y, z) for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)])
     body = np.concatenate([p + rim for p in np.linspace(end, far, 64)])
-    reach = scene.eye.intersect(body, downwards)
-    shadow = (body + reach[:, None] * downwards)[np.isfinite(reach)]
+    shadow = scene.surface.intersect(scene.eye, body, downwards)
+    shadow = shadow[np.all(np.isfinite(shadow), axis=1)]
     return Crop.around(scene.camera.project(np.concatenate([body, shadow])), scene.camera.resolution, margin=2.0)
 
 

@@ -41,6 +41,28 @@ class Eye(Model):
         inside = np.where(rho2 <= self.radius**2, self.radius**2 - rho2, np.nan)
         return self.radius - np.sqrt(inside)
 
+    def arc(self, directions: ArrayLike) -> NDArray[np.float64]:
+        """Arc coordinates `[..., 2]` [mm] of directions `[..., 3]` from the centre: azimuthal equidistant."""
+        d = np.asarray(directions, float)
+        rho = np.hypot(d[..., 0], d[..., 1])
+        along = self.radius * np.arctan2(rho, -d[..., 2])
+        return d[..., :2] * (along / np.where(rho > 0.0, rho, 1.0))[..., None]
+
+    def arc_gradient(self, directions: ArrayLike, by_arc: ArrayLike) -> NDArray[np.float64]:
+        """Gradient `[..., 3]` over the unit sphere of what has the gradient `by_arc` `[..., 2]` over arc coordinates.
+
+        Along the meridian an angle is radius times as long as an arc; across it, sin(angle) / angle shorter.
+        """
+        d, g = np.asarray(directions, float), np.asarray(by_arc, float)
+        rho = np.hypot(d[..., 0], d[..., 1])
+        stretch = 1.0 / np.sinc(np.arctan2(rho, -d[..., 2]) / np.pi)
+        outwards = d[..., :2] / np.where(rho > 0.0, rho, 1.0)[..., None]
+        along = np.sum(outwards * g, axis=-1)[..., None]
+        # at the pole there is no meridian, and both stretches are 1
+        across = (g - along * outwards) * stretch[..., None]
+        sideways = across - along * outwards * d[..., 2:]
+        return self.radius * np.concatenate([sideways, along * rho[..., None]], axis=-1)
+
 
 class Globe(Model):
     """The whole eyeball, closed but for a pupil that swallows light: adds what its walls reflect to each other.

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from pathlib import Path
 from typing import Any
 
@@ -41,11 +42,18 @@ class Scene(Model):
 
     @model_validator(mode="after")
     def _fits(self) -> Scene:
-        if self.camera.height <= 2.0 * self.eye.radius:
+        surface, radius = self.surface, self.eye.radius
+        if self.camera.height <= 2.0 * radius * max(1.0, surface.semi_axes[2]):
             raise ValueError("camera.height must put the camera above the eye (more than twice eye.radius)")
-        for bump in self.surface.bumps:
-            if np.hypot(bump.x, bump.y) >= self.eye.radius:
+        for bump in surface.bumps:
+            if np.hypot(bump.x, bump.y) >= radius:
                 raise ValueError(f"the bump at ({bump.x:g}, {bump.y:g}) mm lies outside the eye")
+        if surface.height_map is not None and surface.height_map.reach > math.pi / 2.0 * radius:
+            raise ValueError("the height map reaches beyond the lower half of the eye")
+        if surface.relief > radius / 2.0:
+            raise ValueError(f"the surface rises or sinks by up to {surface.relief:g} mm, over half the eye's radius")
+        if self.interreflection is not None and surface != Surface(bumps=surface.bumps):
+            raise ValueError("interreflection is worked out in a sphere: leave semi_axes and height_map out of surface")
         return self
 
     def pose(self, apex: NDArray[np.float64]) -> Pose:
@@ -57,12 +65,16 @@ class Scene(Model):
             )
         return Pose.through(apex, self.instrument.rcm)
 
-    def depth(self, apex: NDArray[np.float64]) -> float:
-        """How far inside the surface a point `[3]` lies [mm]; negative outside."""
-        offset = np.asarray(apex, float) - self.eye.centre
-        distance = float(np.linalg.norm(offset))
-        direction = offset / distance if distance > 0.0 else np.array([0.0, 0.0, -1.0])
-        return float(self.eye.radius) - float(self.surface.displacement(self.eye, direction)) - distance
+    def depth(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
+        """How far inside the surface points `[..., 3]` lie `[...]` [mm], along rays from the eye's centre.
+
+        Negative outside.
+        """
+        offset = np.asarray(points, float) - self.eye.centre
+        distance = np.linalg.norm(offset, axis=-1)
+        away = np.where(distance[..., None] > 0.0, offset, [0.0, 0.0, -1.0])
+        direction = away / np.linalg.norm(away, axis=-1, keepdims=True)
+        return np.asarray(self.eye.radius - self.surface.displacement(self.eye, direction) - distance)
 
     def outline(self, pose: Pose, spotlight: int, points: int = 256) -> NDArray[np.float64]:
         """Where the edge of a spotlight's cone meets the surface `[points, 3]` [mm], counted round the axis."""

@@ -1,7 +1,11 @@
-"""The retina's surface: the eye's sphere, smooth or with bumps raised towards the inside."""
+"""The retina's surface: the eye's sphere, or an ellipsoid, with bumps and a height map raised towards the inside.
+
+Whatever it is made of, it is one radius over the unit directions seen from the eye's centre, with its gradient.
+"""
 
 from __future__ import annotations
 
+import math
 from typing import Annotated
 
 import numpy as np
@@ -9,10 +13,15 @@ from numpy.typing import ArrayLike, NDArray
 from pydantic import Field
 
 from scene.eye import Eye
+from scene.height_map import HeightMap
 from scene.model import Model, named
 from scene.quantity import Length
 
 Array = NDArray[np.float64]
+_Ratio = Annotated[float, Field(gt=0.5, lt=2.0)]
+_SPHERE = (1.0, 1.0, 1.0)
+#: a Newton step [mm] below which the next one would be lost in rounding
+_CONVERGED = 1e-9
 
 
 class Bump(Model):
@@ -29,25 +38,38 @@ class Bump(Model):
 
 
 class Surface(Model):
-    """The sphere with `bumps`; smooth without any."""
+    """The wall with `bumps` and a `height_map` that add up; smooth without any.
 
+    The wall touches the origin with its posterior pole. It is an ellipsoid with `semi_axes` along x, y and z in units
+    of the eye's radius: (1, 1, 1.1) is a myopic eye, longer than wide.
+    """
+
+    semi_axes: tuple[_Ratio, _Ratio, _Ratio] = _SPHERE
     bumps: tuple[Bump, ...] = Field((), max_length=10000)
+    height_map: HeightMap | None = None
+
+    @property
+    def is_sphere(self) -> bool:
+        """Whether it is the eye's sphere itself."""
+        return self.semi_axes == _SPHERE and self.is_smooth
+
+    @property
+    def is_smooth(self) -> bool:
+        """Whether nothing is raised above the wall."""
+        return not self.bumps and self.height_map is None
 
     @property
     def relief(self) -> float:
-        """Highest possible displacement towards the inside [mm]."""
-        return float(sum(sorted((b.height for b in self.bumps), reverse=True)[:4])) if self.bumps else 0.0
+        """A bound of how far anything is raised above the wall, or sunk below it [mm]."""
+        total = float(sum(sorted((b.height for b in self.bumps), reverse=True)[:4]))
+        if self.height_map is not None:
+            total += self.height_map.spline.bound
+        return total
 
     def displacement(self, eye: Eye, directions: ArrayLike) -> Array:
-        """Displacement towards the centre `[...]` [mm] in unit directions `[..., 3]` seen from the eye's centre."""
+        """Displacement off the eye's sphere towards its centre `[...]` [mm] in unit directions `[..., 3]`."""
         d = np.asarray(directions, float)
-        total = np.zeros(d.shape[:-1])
-        for bump, axis in zip(self.bumps, self._axes(eye), strict=True):
-            # the chord gives the arc to full precision where the cosine would lose half the digits
-            arc = 2.0 * eye.radius * np.arcsin(np.clip(np.linalg.norm(d - axis, axis=-1) / 2.0, 0.0, 1.0))
-            phase = np.pi * arc / bump.diameter
-            total += np.where(arc < bump.diameter / 2.0, bump.height * np.cos(phase) ** 2, 0.0)
-        return total
+        return eye.radius - self._radius(eye, d.reshape(-1, 3))[0].reshape(d.shape[:-1])
 
     def points(self, eye: Eye, directions: ArrayLike) -> Array:
         """Surface points `[..., 3]` [mm] in unit directions `[..., 3]` seen from the eye's centre."""
@@ -57,43 +79,99 @@ class Surface(Model):
     def normals(self, eye: Eye, directions: ArrayLike) -> Array:
         """Unit normals `[..., 3]` towards the inside, exact: for r(u) u they are along -(r u - grad r)."""
         d = np.asarray(directions, float)
-        radius = eye.radius - self.displacement(eye, d)
-        gradient = np.zeros_like(d)  # of the radius over the unit sphere, tangential
-        for bump, axis in zip(self.bumps, self._axes(eye), strict=True):
-            chord = np.linalg.norm(d - axis, axis=-1)
-            arc = 2.0 * eye.radius * np.arcsin(np.clip(chord / 2.0, 0.0, 1.0))
-            inside = (arc < bump.diameter / 2.0) & (chord > 0.0)
-            slope = np.pi * bump.height / bump.diameter * np.sin(2.0 * np.pi * arc / bump.diameter)
-            away = d * np.sum(d * axis, axis=-1, keepdims=True) - axis  # tangential, away from the bump's centre
-            length = np.linalg.norm(away, axis=-1)
-            unit = away / np.where(length > 0.0, length, 1.0)[..., None]
-            gradient += np.where(inside, slope * eye.radius, 0.0)[..., None] * unit
-        n = gradient - radius[..., None] * d
+        radius, gradient = self._radius(eye, d.reshape(-1, 3))
+        n = gradient.reshape(d.shape) - radius.reshape(d.shape[:-1])[..., None] * d
         return n / np.linalg.norm(n, axis=-1, keepdims=True)
 
     def intersect(self, eye: Eye, origin: ArrayLike, direction: ArrayLike) -> Array:
         """Where rays (origins, unit directions `[..., 3]`) meet the far wall: points `[..., 3]` [mm], NaN for none.
 
-        Fixed point on the radius: the displaced wall is met where the sphere of the radius found last is. A ray that
-        grazes a bump's flank may meet it more than once; the meeting nearest the undisturbed sphere is returned.
+        Sphere and ellipsoid in closed form, what is raised above them by Newton's method between the ray's point
+        nearest the eye's centre and the outside, to 1e-9 mm. A ray that grazes a flank may meet it more than once;
+        then it is the meeting that is found from the wall.
         """
         o, d = np.broadcast_arrays(np.asarray(origin, float), np.asarray(direction, float))
-        point = o + eye.intersect(o, d)[..., None] * d
-        if not self.bumps:
-            return point
+        along = self._to_wall(eye, o, d)
+        if not self.is_smooth:
+            flat = self._to_surface(eye, o.reshape(-1, 3), d.reshape(-1, 3), along.ravel())
+            along = flat.reshape(along.shape)
+        return o + along[..., None] * d
+
+    def _to_wall(self, eye: Eye, o: Array, d: Array) -> Array:
+        """Distance `[...]` [mm] along rays to the far wall of sphere or ellipsoid."""
+        if self.semi_axes == _SPHERE:
+            return eye.intersect(o, d)
+        # squeezed along its axes the ellipsoid is a sphere about the same pole, met at the same distances
+        squeeze = 1.0 / np.array(self.semi_axes)
+        return eye.intersect(o * squeeze, d * squeeze)
+
+    def _to_surface(self, eye: Eye, o: Array, d: Array, wall: Array) -> Array:
+        """Distance `[N]` [mm] to the surface from that to the wall; NaN where a ray has none."""
         v = o - eye.centre
-        b = np.sum(v * d, axis=-1)
-        c = np.sum(v * v, axis=-1)
-        for _ in range(60):
-            outward = point - eye.centre
-            radius = eye.radius - self.displacement(eye, outward / np.linalg.norm(outward, axis=-1, keepdims=True))
-            disc = b * b - c + radius**2
-            moved = o + (np.sqrt(np.where(disc >= 0.0, disc, np.nan)) - b)[..., None] * d
-            step = np.nanmax(np.abs(moved - point), initial=0.0)
-            point = moved
-            if step < 1e-12:
+        b = np.einsum("ij,ij->i", v, d)
+        axes = eye.radius * np.array(self.semi_axes)
+        outside = abs(axes[2] - eye.radius) + axes.max() + self.relief
+        span = b * b - np.einsum("ij,ij->i", v, v) + outside**2
+        result = np.full(len(o), np.nan)
+        low, high = np.maximum(-b, 0.0), np.sqrt(np.maximum(span, 0.0)) - b
+        left = np.flatnonzero(high > low)
+        low, high = low[left], high[left]
+        t = np.clip(np.where(np.isfinite(wall[left]), wall[left], low), low, high)
+        for _ in range(100):
+            v_, d_ = v[left], d[left]
+            at = v_ + t[:, None] * d_
+            distance = np.linalg.norm(at, axis=1)
+            u = at / np.maximum(distance, 1e-300)[:, None]
+            radius, gradient = self._radius(eye, u)
+            beyond = distance - radius
+            slope = np.einsum("ij,ij->i", u, d_) - np.einsum("ij,ij->i", gradient, d_) / np.maximum(distance, 1e-300)
+            low, high = np.where(beyond < 0.0, t, low), np.where(beyond > 0.0, t, high)
+            step = -beyond / np.where(np.abs(slope) > 1e-6, slope, np.inf)
+            newton = (np.abs(slope) > 1e-6) & (t + step >= low) & (t + step <= high)
+            t = np.where(newton, t + step, 0.5 * (low + high))
+            closed = high - low < 1e-12
+            # the bracket of a ray that begins outside closes where there is no surface
+            done = np.where(closed, np.abs(beyond), np.where(newton, np.abs(step), np.inf)) < _CONVERGED
+            result[left[done]] = t[done]
+            going = ~done & ~closed
+            if not going.any():
                 break
-        return point
+            left, t, low, high = left[going], t[going], low[going], high[going]
+        return result
+
+    def _radius(self, eye: Eye, d: Array) -> tuple[Array, Array]:
+        """Distance from the eye's centre `[N]` [mm] in unit directions `[N, 3]`, and its gradient there `[N, 3]`."""
+        radius, gradient = self._wall(eye, d)
+        for bump, axis in zip(self.bumps, self._axes(eye), strict=True):
+            widest = math.cos(min(bump.diameter / (2.0 * eye.radius), math.pi))
+            near = np.flatnonzero(d @ axis > widest)
+            here = d[near]
+            # the chord gives the arc to full precision where the cosine would lose half the digits
+            arc = 2.0 * eye.radius * np.arcsin(np.clip(np.linalg.norm(here - axis, axis=-1) / 2.0, 0.0, 1.0))
+            phase = np.pi * arc / bump.diameter
+            radius[near] -= bump.height * np.cos(phase) ** 2
+            slope = np.pi * bump.height / bump.diameter * np.sin(2.0 * phase)
+            away = here * np.sum(here * axis, axis=-1, keepdims=True) - axis  # tangential, away from the centre
+            length = np.linalg.norm(away, axis=-1)
+            gradient[near] += (slope * eye.radius / np.where(length > 0.0, length, 1.0))[:, None] * away
+        if self.height_map is not None:
+            height, by_arc = self.height_map.at(eye.arc(d))
+            radius -= height
+            gradient -= eye.arc_gradient(d, by_arc)
+        return radius, gradient
+
+    def _wall(self, eye: Eye, d: Array) -> tuple[Array, Array]:
+        """`_radius` of sphere or ellipsoid."""
+        if self.semi_axes == _SPHERE:
+            return np.full(len(d), eye.radius), np.zeros_like(d)
+        axes = eye.radius * np.array(self.semi_axes)
+        v = (eye.centre - [0.0, 0.0, axes[2]]) / axes
+        w = d / axes
+        a, b = np.einsum("ij,ij->i", w, w), w @ v
+        radius = (np.sqrt(b * b - a * (v @ v - 1.0)) - b) / a
+        outwards = (v + radius[:, None] * w) / axes
+        along = np.einsum("ij,ij->i", outwards, d)
+        return radius, -radius[:, None] * (outwards / along[:, None] - d)
 
     def _axes(self, eye: Eye) -> Array:
         xy = np.array([(b.x, b.y) for b in self.bumps]).reshape(-1, 2)
@@ -117,5 +195,15 @@ AnySurface = Annotated[Surface, named(SURFACES, "surface")]
 
 
 def surface_name(surface: Surface) -> str:
-    """`smooth`, `bumps`, or the number of bumps for a surface of one's own."""
-    return next((name for name, known in SURFACES.items() if known == surface), f"{len(surface.bumps)} bumps")
+    """`smooth`, `bumps`, or what a surface of one's own is made of."""
+    for name, known in SURFACES.items():
+        if known == surface:
+            return name
+    parts = []
+    if surface.semi_axes != _SPHERE:
+        parts.append(f"ellipsoid {' x '.join(f'{ratio:g}' for ratio in surface.semi_axes)}")
+    if surface.bumps:
+        parts.append(f"{len(surface.bumps)} bump{'s' * (len(surface.bumps) > 1)}")
+    if surface.height_map is not None:
+        parts.append("height map")
+    return " with ".join(filter(None, [parts[0], " and ".join(parts[1:])]))
