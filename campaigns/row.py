@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Annotated
 import numpy as np
 from pydantic import Field, FiniteFloat, model_validator
 
-from scene import Pose
+from scene import Pose, Scene
 from scene.model import Model
 
 if TYPE_CHECKING:
@@ -103,10 +103,11 @@ class _Stated:
             roll, bound = roll or found.roll is not None, bound or found.bound is not None
         return cls(sigmas, roll, bound)
 
-    def row(self, true: Pose, found: Finding | None) -> Row:
+    def row(self, true: Pose, found: Finding | None, scene: Scene) -> Row:
         """Standard deviations and how well they hold, roll and bound; NaN where there is none.
 
-        `est_chi2_tip` is the tip's error in units of its own covariance: chi-squared of three degrees if that is right.
+        `est_chi2_tip` is the tip's error in units of its own covariance: chi-squared of three degrees if that is
+        right. `true_in_frame` is the share of the patches' true outline that the frame shows.
         """
         row: Row = {}
         if self.sigmas:
@@ -118,7 +119,8 @@ class _Stated:
                 # a covariance that cannot be inverted is one a stranger's journal holds
                 with contextlib.suppress(np.linalg.LinAlgError):
                     chi2 = float(error @ np.linalg.solve(np.array([line[:3] for line in found.covariance[:3]]), error))
-            row = {f"est_sigma_{c}_mm": sigma for c, sigma in zip(_XYZ, spread, strict=False)}
+            row = {"true_in_frame": _in_frame(true, scene)}
+            row |= {f"est_sigma_{c}_mm": sigma for c, sigma in zip(_XYZ, spread, strict=False)}
             row |= {"est_chi2_tip": chi2, "est_sigma_axis_deg": math.degrees(math.hypot(spread[3], spread[4]))}
             row |= {"est_sigma_roll_deg": math.degrees(spread[5])} if self.sigmas > 5 else {}
         if self.roll:
@@ -127,6 +129,12 @@ class _Stated:
         if self.bound:
             row["est_bound_mm"] = _NAN if found is None or found.bound is None else found.bound
         return row
+
+
+def _in_frame(pose: Pose, scene: Scene) -> float:
+    edge = np.concatenate([scene.outline(pose, k, points=64) for k in range(len(scene.spotlights))])
+    pixels = scene.camera.project(edge)  # NaN where a ray misses the eye compares as outside
+    return float(np.mean(np.all((pixels >= 0.0) & (pixels <= scene.camera.resolution), axis=-1)))
 
 
 def rows(plan: Plan, records: Mapping[str, Record]) -> Iterator[Row]:
@@ -153,4 +161,4 @@ def rows(plan: Plan, records: Mapping[str, Record]) -> Iterator[Row]:
                 row: Row = {"case": case.key, **case.labels, "localizer": localizer, "pose": pose}
                 row |= {"status": "failed" if reason else "ok", "reason": reason}
                 row |= errors(group.pose(pose), found, case.scene.instrument.rcm)
-                yield row | stated.row(group.pose(pose), found) | case.swept
+                yield row | stated.row(group.pose(pose), found, case.scene) | case.swept

@@ -20,7 +20,8 @@ from results.variants import by_axes, split
 _INSIDE = 7.814727903251179
 _GROSS_SIGMAS, _GROSS_MM = 6.0, 0.05
 _NOTES = (
-    "Positions in um, angles in deg; over the frames that were localized.",
+    "Positions in um, angles in deg; over the frames that were localized. Refused: of the frames that show the whole "
+    "patch; outside: of the others.",
     "sigma: median of the stated ones; inside: share of the tips within their 95 % ellipsoid; gross: off by more than "
     "6 sigma + 50 um.",
     "bound: Cramer-Rao over even albedo with what the localizer knows, rms; ratio: rms error over that of the bound.",
@@ -29,7 +30,7 @@ _NOTES = (
 
 def precision_table(run: Run) -> Table | None:
     """The table of a run in which a localizer states its sigmas; None if there is none."""
-    if run.rows is None or not set(STATED[:4]) <= set(run.rows.frame):
+    if run.rows is None or not set(STATED[:5]) <= set(run.rows.frame):
         return None
     records: list[dict[str, Any]] = []
     lines: list[tuple[str, ...]] = []
@@ -39,8 +40,9 @@ def precision_table(run: Run) -> Table | None:
             records.append({**variant.setting, **axes, **found})
             place = " ".join(str(axes[name]) for name in ("trajectory", "spotlights", "surface"))
             lines.append((variant.label, place, f"{axes['power_w']:g}", *_cells(found)))
-    header = ("localizer", "frames", "power [W]", "n", "refused", "mean", "rms", "max", "axis", "roll", "sigma",
-              "inside", "gross", "bound", "ratio")  # fmt: skip
+    reached = ("mean", "rms", "max", "axis", "roll")
+    header = ("localizer", "frames", "power [W]", "n", "refused", "outside", *reached, "sigma", "inside", "gross",
+              "bound", "ratio")  # fmt: skip
     block = Block("", header, tuple(lines), _NOTES)
     return Table("precision", "Precision: reached, stated, and possible", pd.DataFrame(records), (block,))
 
@@ -54,9 +56,12 @@ def precision(rows: pd.DataFrame) -> dict[str, float]:
     chi2 = good["est_chi2_tip"].to_numpy()[stated]
     roll = _column(good, "est_roll_error_deg")
     rms, bound = _rms(error), _rms(_column(good, "est_bound_mm"))
+    failed = rows[rows["status"] == "failed"]
+    whole = int(np.count_nonzero(failed["true_in_frame"] >= 1.0))
     return {
         "n": len(good),
-        "failed": len(rows) - len(good),
+        "refused": whole,
+        "outside": len(failed) - whole,
         "mean_mm": _mean(error),
         "rms_mm": rms,
         "max_mm": float(error.max()) if len(error) else math.nan,
@@ -74,10 +79,9 @@ def _cells(found: dict[str, float]) -> tuple[str, ...]:
     um = {name: number(1e3 * found[f"{name}_mm"]) for name in ("mean", "rms", "max", "sigma", "bound")}
     inside = f"{100.0 * found['inside_95']:.0f} %" if math.isfinite(found["inside_95"]) else "–"
     angles = (number(found["mean_axis_deg"]), number(found["mean_roll_deg"]))
-    return (
-        f"{found['n']:.0f}", f"{found['failed']:.0f}", um["mean"], um["rms"], um["max"], *angles, um["sigma"], inside,
-        f"{found['gross']:.0f}", um["bound"], number(found["over_bound"]),
-    )  # fmt: skip
+    counts = [f"{found[name]:.0f}" for name in ("n", "refused", "outside")]
+    reached = (um["mean"], um["rms"], um["max"], *angles)
+    return (*counts, *reached, um["sigma"], inside, f"{found['gross']:.0f}", um["bound"], number(found["over_bound"]))
 
 
 def _column(rows: pd.DataFrame, name: str) -> np.ndarray[Any, np.dtype[np.float64]]:

@@ -43,10 +43,12 @@ _NUMBERS = (
     "rotation_error_deg",
     "axis_error_deg",
 )
-#: what estimators state of themselves, where they do: sigmas, the tip's chi-squared, the roll's error, the bound
+#: where estimators state sigmas: those, the tip's chi-squared, the share of the patch in the frame, the roll's error,
+#: the bound
 STATED = (
     *(f"est_sigma_{axis}_mm" for axis in "xyz"),
     "est_chi2_tip",
+    "true_in_frame",
     "est_roll_error_deg",
     "est_bound_mm",
 )
@@ -89,8 +91,8 @@ def read_rows(path: Path, swept: Iterable[str] = ()) -> Rows:
     """Rows from a parquet or CSV file.
 
     A column beyond the known ones belongs to a swept key if its name is a dotted path or stands in `swept`; other
-    columns that begin with `est_` are the estimator's own and left alone. Raises InputError for a file that cannot be read,
-    is too large, lacks a column, has another one, or holds values of the wrong type or out of bounds.
+    columns that begin with `est_` are the estimator's own and left alone. Raises InputError for a file that cannot be
+    read, is too large, lacks a column, has another one, or holds values of the wrong type or out of bounds.
     """
     keys = tuple(swept)
     table = read_table(path, _MAX_ROWS, text=(*_TEXT, *keys))
@@ -99,7 +101,7 @@ def read_rows(path: Path, swept: Iterable[str] = ()) -> Rows:
         raise InputError(f"{path}: no column {', '.join(missing)}; a run's rows have all of {', '.join(COLUMNS)}")
     extra: list[str] = []
     for name in table.column_names:
-        if name in COLUMNS or name.startswith("est_"):
+        if name in COLUMNS or name in STATED or name.startswith("est_"):
             continue
         if "." not in name and name not in keys:
             raise InputError(f"{path}: unknown column '{name}'; a swept key's column is named by its dotted path")

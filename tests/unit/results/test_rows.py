@@ -29,7 +29,9 @@ def refused(tmp_path, make_run):
 
 
 def test_parquet_and_csv_give_the_same_rows(tmp_path, frame, make_run):
-    frame = frame.assign(**{"beam.half_angle": "9 deg", "retina.detail": 0.5, "est_sigma_x_mm": np.nan, "est_other": 1.0})
+    frame = frame.assign(
+        **{"beam.half_angle": "9 deg", "retina.detail": 0.5, "est_sigma_x_mm": np.nan, "est_other": 1.0}
+    )
     one = load_run(make_run(tmp_path / "a", frame)).rows
     two = load_run(make_run(tmp_path / "b", frame, kind="csv")).rows
     pd.testing.assert_frame_equal(one.frame, two.frame)
