@@ -1,228 +1,238 @@
-"""A robust start: the patch's outline at a low threshold above its surroundings, and the cone through the RCM for it.
+"""A robust start: round regions of light, each explained by the cones through the RCM, in the order of how well.
 
-Not Otsu: between a textured retina and a patch it may find the optic disc. A few per cent of the patch's own signal
-above the surroundings lie above everything the ambient light shows.
+What the retina reflects multiplies all light, so its vessels and its disc are steps of the log light whatever falls on
+them. Gradients of the log light of natural images follow Laplace's distribution (J. Huang, D. Mumford, Statistics of
+natural images and models, CVPR 1999), which makes the sum of their absolute values the log-likelihood of an albedo:
+the right cones are those without whose light this sum is least.
 """
 
 from __future__ import annotations
 
 import math
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
 
-import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from localize.forward import look
-from localize.noise import linear_light
-from localize.outline import outline_problem, start_pose
-from localize.prior import Estimate, Knowns
-from localize.profile import Profile
-from localize.solve import minimize
+from localize.forward import look, moved, tangents
+from localize.outcome import LocalizationFailure, Outcome
+from localize.outline import distances
+from localize.prior import Estimate
+from localize.rays import SHIFTS, Rays, rays_across
+from localize.rings import Overview, Ring, find_rings
 from scene.pose import Pose
 from scene.scene import Scene
 from scene.spotlights import spotlight_axes
 
 Array = NDArray[np.float64]
-_FRACTION = 0.07  # of the signal above the surroundings
-_FRACTIONS = (_FRACTION, 0.2, 0.35, 0.55)
-_SEARCH_PX = 512  # side of the frame in which patches are searched
-_USUAL_ALBEDO = 0.08
-_CROP_PX = 140  # side of the crop in which outlines are drawn
-
-
-@dataclass(frozen=True)
-class Patch:
-    """Where the light is, and what level its surroundings have."""
-
-    low: tuple[int, int]  #: first row and column of the lit region [px]
-    high: tuple[int, int]  #: one beyond the last
-    surroundings: float  #: [white]
-    peak: float  #: [white]
+NOTHING = "no spotlight stands out from its surroundings"
+_RINGS = 6
+_TURNS = 4  # steps from a ring's pose to that of the outline the rays see
+_FEWEST_RAYS = 8
+_LEAST_WORTH = 0.2  # share of a ray's gradients that says where the outline is
+#: share of the gradients that a patch explains where nothing else is bright; a disc explains a fifth
+CONVINCING = 0.5
+_LEAST = 0.1
+_RIVAL = 0.85  # share of the best ring's votes with which another may be the patch
+_APART_MM = 0.1  # between poses that count as two
+_ROLLS = 36
+_MATCHED = 0.8  # of a patch's radius: how far its ring may be from where the rig puts it
 
 
 @dataclass(frozen=True)
 class Start:
-    """A first pose and the patch it explains."""
+    """A first pose through the RCM."""
 
     pose: Pose
-    patch: Patch
-    misfit: float  #: root mean square distance of the outline from the cone, over the patch's width
+    explained: float  #: share of the log light's gradients across the outlines that the cones explain, at most 1
+    overview: Overview
 
-
-def grey(image: NDArray[np.generic]) -> NDArray[np.generic]:
-    """The image itself `[H, W]`, or the green channel of `[H, W, 3]`: patches are searched in one channel."""
-    return image if image.ndim == 2 else image[..., 1]
-
-
-def find_patch(image: NDArray[np.generic], scene: Scene, reference: NDArray[np.generic] | None = None) -> Patch | str:
-    """The region lit by the spotlights in an image `[H, W]` or `[H, W, 3]`, or the reason why there is none."""
-    side = image.shape[0]
-    stride = -(-side // _SEARCH_PX)
-    coarse = (slice(stride // 2, None, stride),) * 2
-    small = _signal(image[coarse], scene)
-    if reference is not None:
-        small = small - _signal(reference[coarse], scene)
-    smooth = cv2.blur(small, (3, 3))
-    surroundings = float(np.median(small))
-    noise = 1.4826 * float(np.median(np.abs(smooth - surroundings)))
-    peak = float(smooth.max())
-    rise = peak - surroundings
-    if rise <= max(8.0 * noise, 1e-6):
-        return "no spotlight stands out from its surroundings"
-    level = surroundings + max(_FRACTION * rise, min(4.0 * noise, 0.3 * rise))
-    count, labels, stats, _ = cv2.connectedComponentsWithStats((smooth > level).astype(np.uint8))
-    if count < 2:
-        return "no spotlight stands out from its surroundings"
-    lit = np.flatnonzero(labels)
-    label = labels.ravel()[lit].astype(np.intp)
-    above = smooth.ravel()[lit] - surroundings
-    light, brightest = np.bincount(label, weights=above, minlength=count), np.zeros(count)
-    np.maximum.at(brightest, label, above)
-    # the optic disc may be large but is dim, specks of glint are bright but small;
-    # parts of a patch that vessels or the shaft cut apart are neither
-    bright = brightest > 0.3 * rise
-    box = stats[np.flatnonzero(bright & (light >= 0.03 * light[bright].max(initial=0.0)))]
-    low = box[:, :2].min(axis=0)
-    high = (box[:, :2] + box[:, 2:4]).max(axis=0)
-    return Patch(
-        (int(low[1]) * stride, int(low[0]) * stride),
-        (min(side, int(high[1]) * stride), min(side, int(high[0]) * stride)),
-        surroundings,
-        peak,
-    )
+    def explains(self, pose: Pose, scene: Scene) -> float:
+        """The share that another `pose` explains of the same image; 0 if it has no outline in the frame."""
+        seen = rays_across(self.overview, scene, pose)
+        return _share(seen) if seen else 0.0
 
 
 def find_start(image: NDArray[np.generic], scene: Scene, reference: NDArray[np.generic] | None = None) -> Start | str:
-    """A first pose from an image `[H, W]` or `[H, W, 3]`, or the reason why there is none."""
-    patch = find_patch(image, scene, reference)
-    if isinstance(patch, str):
-        return patch
-    profile = Profile.of(scene.beam)
-    # a hard edge that blur has spread crosses a low threshold outside the cone
-    hard = profile.angle_at(0.5) > 0.97 * scene.beam.half_angle
-    best: Start | str = "the patch is too small to measure"
-    for fraction in _FRACTIONS[1:] if hard else _FRACTIONS:
-        found = _at_level(image, scene, patch, reference, fraction)
-        if isinstance(found, str):
-            best = found if isinstance(best, str) else best
-            continue
-        if isinstance(best, str) or found.misfit < 0.7 * best.misfit:
-            best = found
-        # the disc beside a patch joins its outline at the lowest level only, and no cone explains the two
-        if best.misfit < 0.02:
-            break
-    return best
+    """The best first pose from an image `[H, W]` or `[H, W, 3]`, or the reason why there is none."""
+    return next(find_starts(image, scene, reference), NOTHING)
 
 
-def _at_level(
-    image: NDArray[np.generic],
-    scene: Scene,
-    patch: Patch,
-    reference: NDArray[np.generic] | None,
-    fraction: float,
-) -> Start | str:
-    """The start from the outline at one level, a fraction of the signal above the surroundings."""
-    pixels = _outline(image, scene, patch, reference, fraction)
-    if isinstance(pixels, str):
-        return pixels
-    profile = Profile.of(scene.beam)
-    half_angle = profile.angle_at(min(0.9, fraction))
-    width = float(np.sqrt(np.mean(np.var(pixels, axis=0))))
-    for _ in range(2):
-        fitted = _fit(pixels, scene, half_angle)
-        if isinstance(fitted, str):
-            return fitted
-        pose, misfit = fitted
-        if patch.peak < 0.98:
-            break
-        half_angle = profile.angle_at(_clipped_level(fraction, scene, pose))
-    return Start(pose, patch, misfit / width)
+def find_starts(
+    image: NDArray[np.generic], scene: Scene, reference: NDArray[np.generic] | None = None
+) -> Iterator[Start]:
+    """Distinct first poses from an image `[H, W]` or `[H, W, 3]`, the one that explains it best first."""
+    overview = Overview.of(image, scene, reference)
+    rings = find_rings(overview, scene, _RINGS)
+    found = _settled(overview, scene, [ring for ring in rings if _rivals(ring, rings[0])], [])
+    if not found or found[0].explained <= CONVINCING:
+        found = _settled(overview, scene, rings, found)
+        # a patch that touches something brighter: what was found is taken out of the vote
+        for start in found[:1]:
+            curves = [scene.camera.project(scene.outline(start.pose, k, 96)) for k in range(len(scene.spotlights))]
+            found = _settled(overview, scene, find_rings(overview, scene, _RINGS, curves), found)
+        found = _settled(overview, scene, find_rings(overview, scene, _RINGS, [rings[0].curve()]), found)
+    best = found[0].explained if found else 0.0
+    yield from (start for start in found[:3] if start.explained > max(_LEAST, 0.3 * best))
 
 
-def _signal(pixels: NDArray[np.generic], scene: Scene) -> NDArray[np.float32]:
-    """Light in one channel; where that is dark in a colour image, what the brightest channel shows."""
-    light = linear_light(pixels, scene)[0]
-    return light if light.ndim == 2 else light.max(axis=2)
+def first_believed(starts: Iterable[Start], localized: Callable[[Start], Outcome]) -> Outcome:
+    """The outcome of the first start that does not end in a refusal, or the first refusal."""
+    refusal: Outcome = LocalizationFailure(NOTHING)
+    for number, start in enumerate(starts):
+        outcome = localized(start)
+        if outcome:
+            return outcome
+        refusal = refusal if number else outcome
+    return refusal
 
 
-def _outline(
-    image: NDArray[np.generic],
-    scene: Scene,
-    patch: Patch,
-    reference: NDArray[np.generic] | None,
-    fraction: float,
-) -> Array | str:
-    """Points on the patch's hull or hulls `[N, 2]` [px] at `fraction` of the signal above the surroundings."""
-    side = image.shape[0]
-    margin = max(12, int(0.15 * max(patch.high[0] - patch.low[0], patch.high[1] - patch.low[1])))
-    r0, c0 = max(0, patch.low[0] - margin), max(0, patch.low[1] - margin)
-    r1, c1 = min(side, patch.high[0] + margin), min(side, patch.high[1] + margin)
-    b = max(1, max(r1 - r0, c1 - c0) // _CROP_PX)
-    h, w = (r1 - r0) // b, (c1 - c0) // b
-    crop = (slice(r0, r0 + h * b), slice(c0, c0 + w * b))
-    light = _signal(image[crop], scene)
-    if reference is not None:
-        light = light - _signal(reference[crop], scene)
-    light = np.asarray(
-        cv2.GaussianBlur(cv2.resize(light, (w, h), interpolation=cv2.INTER_AREA), (0, 0), 0.8), np.float32
-    )
-    peak = float(np.quantile(light, 0.99))
-    rise = max(peak - patch.surroundings, 1e-6)
-    mask = (light > patch.surroundings + fraction * rise).astype(np.uint8)
-    contours, _ = cv2.findContours(mask, cv2.RETR_EXTERNAL, cv2.CHAIN_APPROX_NONE)
-    areas = np.array([cv2.contourArea(c) for c in contours])
-    if not len(areas) or areas.max() < 12.0:
-        return "the patch is too small to measure"
-    single = len(scene.spotlights) == 1
-    kept = [c for c, a in zip(contours, areas, strict=True) if a >= (0.1 if single else 0.05) * areas.max()]
-    outlines = [np.concatenate(kept)] if single else kept
-    points = [_dense_hull(o.reshape(-1, 2).astype(float)) for o in outlines]
-    edge = np.concatenate(points)
-    # bins that touch the frame's border cut the patch: there the hull is no outline
-    full = np.array([c0, r0]) + (edge + 0.5) * b
-    inside = np.all((full > 1.5 * b + 1.0) & (full < side - 1.5 * b - 1.0), axis=1)
-    if np.count_nonzero(inside) < 12:
-        return "the patch leaves the frame"
-    return full[inside]
+def _rivals(ring: Ring, best: Ring) -> bool:
+    apart = float(np.linalg.norm(ring.centre - best.centre))
+    return ring is best or (ring.votes > _RIVAL * best.votes and apart > 0.7 * max(ring.radius, best.radius))
 
 
-def _dense_hull(points: Array) -> Array:
-    """The convex hull of contour points, grown by the half pixel a contour runs inside, as points about 1 px apart."""
-    hull = cv2.convexHull(points.astype(np.float32)).reshape(-1, 2).astype(float)
-    centre = points.mean(axis=0)
-    nxt = np.roll(hull, -1, axis=0)
-    length = np.linalg.norm(nxt - hull, axis=1)
-    parts = [a + np.linspace(0.0, 1.0, max(1, int(n)), endpoint=False)[:, None] * (e - a)
-             for a, e, n in zip(hull, nxt, length, strict=True)]  # fmt: skip
-    dense = np.concatenate(parts)
-    out = dense - centre
-    return dense + 0.5 * out / np.maximum(np.linalg.norm(out, axis=1, keepdims=True), 1e-9)
+def _settled(overview: Overview, scene: Scene, rings: Sequence[Ring], before: Sequence[Start]) -> list[Start]:
+    """The poses that rings lead to, and those found before, without repetition, the best first."""
+    poses = _single_poses(rings, scene) if len(scene.spotlights) == 1 else _rig_poses(rings, scene)
+    found = [*before, *(start for pose in poses if (start := _settle(overview, scene, pose)) is not None)]
+    distinct: list[Start] = []
+    for start in sorted(found, key=lambda s: -s.explained):
+        if all(_differ(start.pose, other.pose) for other in distinct):
+            distinct.append(start)
+    return distinct
 
 
-def _fit(pixels: Array, scene: Scene, half_angle: float) -> tuple[Pose, float] | str:
-    """The cone through the RCM that fits outline points, and its misfit [px]."""
-    spots = np.zeros(len(pixels), np.intp)
-    pose = start_pose(pixels, spots, scene, half_angle)
-    if pose is None:
-        return "the patch is not on the retina"
+def _differ(a: Pose, b: Pose) -> bool:
+    turned = abs(math.remainder(a.roll - b.roll, 2.0 * math.pi))
+    return float(np.linalg.norm(a.apex - b.apex)) > _APART_MM or turned > 0.2
+
+
+def _share(seen: list[Rays]) -> float:
+    left = sum(float(rays.left[:, len(SHIFTS) // 2].sum()) for rays in seen)
+    return 1.0 - left / max(1e-9, sum(float(rays.total.sum()) for rays in seen))
+
+
+def _settle(overview: Overview, scene: Scene, pose: Pose) -> Start | None:
+    """The pose near `pose` whose outlines the rays see; None where there is none."""
+    estimate: Estimate | None = Estimate.at(pose, scene)
+    for turn in range(_TURNS + 1):
+        if estimate is None:
+            return None
+        seen = rays_across(overview, scene, estimate.pose)
+        if not seen:
+            return None
+        if turn == _TURNS:
+            return Start(estimate.pose, _share(seen), overview)
+        points, worth = zip(*(rays.found() for rays in seen), strict=True)
+        spots = np.concatenate([np.full(len(r.total), r.spotlight, np.intp) for r in seen])
+        sizes = np.concatenate([np.linalg.norm(r.ends - r.middle, axis=1) for r in seen])
+        keep = np.concatenate(worth) > _LEAST_WORTH
+        estimate = _towards(
+            estimate, np.concatenate(points)[keep], spots[keep], np.concatenate(worth)[keep], sizes[keep]
+        )
+    return None
+
+
+def _towards(estimate: Estimate, pixels: Array, spots: NDArray[np.intp], worth: Array, sizes: Array) -> Estimate | None:
+    """One step of Gauss and Newton towards outlines through `pixels` `[N, 2]` [px], with the axis on the RCM."""
+    if len(pixels) < _FEWEST_RAYS:
+        return None
+    scene, pose = estimate.scene, estimate.pose
     roll = len(scene.spotlights) > 1
-    size, estimate = 6 if roll else 5, Estimate(pose, scene, half_angle)
-    sigma = scene.camera.resolution / 1000.0
-    solution = None
-    for _ in range(6 if roll else 1):
-        keep = np.ones(len(pixels), bool)
-        if roll:
-            spots, keep = nearest_outline(pixels, estimate)
-        solution = minimize(
-            outline_problem(pixels[keep], spots[keep], sigma, scene, Knowns(rcm_sigma_mm=1e-3), roll=roll),
-            estimate, size, (), tolerance=1e-5, iterations=12 if not roll else 6,
-        )  # fmt: skip
-        if solution is None or scene.depth(solution.estimate.pose.apex) <= 0.0:
-            return "no cone through the remote centre of motion explains the patch"
-        estimate = solution.estimate
-    assert solution is not None
-    return estimate.pose, float(np.sqrt(np.mean(np.square(solution.residuals)))) * sigma
+    r, jacobian, _ = distances(pixels, spots, estimate, roll=roll)
+    rcm = np.asarray(scene.instrument.rcm)
+    length = float(np.linalg.norm(pose.apex - rcm))
+    u, v = tangents(pose.axis)
+    tied = jacobian[:, :3] + (np.outer(jacobian[:, 3], u) + np.outer(jacobian[:, 4], v)) / length
+    if roll:
+        tied = np.column_stack([tied, jacobian[:, 5]])
+    scale = np.maximum(0.01 * sizes, 1.4826 * float(np.median(np.abs(r))))
+    weighted = tied * (worth / (4.0 + np.square(r / scale)) / scale**2)[:, None]
+    try:
+        step = -np.linalg.solve(weighted.T @ tied, weighted.T @ r)
+    except np.linalg.LinAlgError:
+        return None
+    reach = 0.4 * float(scene.eye.intersect(pose.apex, pose.axis))
+    step *= min(1.0, reach / max(1e-9, float(np.linalg.norm(step[:3]))))
+    tip = pose.apex + step[:3]
+    if not np.all(np.isfinite(step)) or scene.depth(tip) <= 0.0:
+        return None
+    through = Pose.through(tip, rcm)
+    if not roll:
+        return Estimate.at(through, scene)
+    turned = moved(pose, np.array([*step[:3], u @ step[:3] / length, v @ step[:3] / length, step[3]]))
+    return Estimate.at(Pose(tip, through.axis, turned.roll), scene)
+
+
+def _single_poses(rings: Sequence[Ring], scene: Scene) -> list[Pose]:
+    """The poses through the RCM that put one patch on each ring."""
+    found = (_on(ring, np.zeros(1), 0, scene) for ring in rings)
+    return [pose for poses in found for pose in poses]
+
+
+def _rig_poses(rings: Sequence[Ring], scene: Scene) -> list[Pose]:
+    """The poses through the RCM that put the rig's patches on most rings: one for each roll that may be."""
+    number = len(scene.spotlights)
+    ranked = []
+    for ring in rings[:2]:
+        for k in range(number):
+            for pose in _on(ring, np.arange(_ROLLS) * (2.0 * math.pi / _ROLLS), k, scene):
+                ranked.append(_matched(pose, rings, ring.radius, scene))
+    ranked = sorted((m for m in ranked if np.count_nonzero(m[2] >= 0) > 1), key=lambda m: m[0])
+    found: list[Pose] = []
+    for _, pose, partner in ranked:
+        if len(found) < number and all(_turned(pose, other) > 0.6 for other in found):
+            estimate: Estimate | None = Estimate.at(pose, scene)
+            pairs = [(rings[j].curve(), k) for k, j in enumerate(partner) if j >= 0]
+            spots = np.repeat([k for _, k in pairs], len(pairs[0][0]))
+            pixels = np.concatenate([curve for curve, _ in pairs])
+            for _ in range(3):
+                if estimate is not None:
+                    estimate = _towards(estimate, pixels, spots, np.ones(len(pixels)), np.full(len(pixels), 10.0))
+            if estimate is not None:
+                found.append(estimate.pose)
+    return found
+
+
+def _turned(a: Pose, b: Pose) -> float:
+    return abs(math.remainder(a.roll - b.roll, 2.0 * math.pi))
+
+
+def _on(ring: Ring, rolls: Array, spotlight: int, scene: Scene) -> list[Pose]:
+    """Poses through the RCM with each of `rolls` whose cone `spotlight` meets the wall in the ring."""
+    edge = look(scene, ring.curve()).points
+    rcm = np.asarray(scene.instrument.rcm)
+    if not np.all(np.isfinite(edge)):
+        return []
+    wall = edge.mean(axis=0)
+    line = (wall - rcm) / np.linalg.norm(wall - rcm)
+    off = edge - wall
+    off = off - (off @ line)[:, None] * line
+    longest = 0.95 * float(np.linalg.norm(wall - rcm))
+    away = min(longest, float(np.mean(np.linalg.norm(off, axis=1))) / math.tan(scene.beam.half_angle))
+    found = []
+    for roll in rolls:
+        axis = line
+        for _ in range(2):
+            pose = Pose.through(wall - away * axis, rcm)
+            axis = spotlight_axes(Pose(pose.apex, pose.axis, float(roll)), scene.spotlights)[spotlight]
+        if scene.depth(pose.apex) > 0.0:
+            found.append(Pose(pose.apex, pose.axis, float(roll)))
+    return found
+
+
+def _matched(pose: Pose, rings: Sequence[Ring], radius: float, scene: Scene) -> tuple[float, Pose, NDArray[np.intp]]:
+    """How far the patches are from the nearest rings, in radii, the pose, and the rings; -1 where none is near."""
+    axes = spotlight_axes(pose, scene.spotlights)
+    wall = pose.apex + scene.eye.intersect(pose.apex, axes)[:, None] * axes
+    off = scene.camera.project(wall)[:, None] - np.array([ring.centre for ring in rings])
+    size = np.abs(np.log(np.array([ring.radius for ring in rings]) / radius))
+    distance = np.linalg.norm(off, axis=2) / radius + size
+    nearest = np.argmin(distance, axis=1)
+    far = np.minimum(distance.min(axis=1), _MATCHED)
+    return float(far.sum()), pose, np.where(far < _MATCHED, nearest, -1)
 
 
 def nearest_outline(pixels: Array, estimate: Estimate) -> tuple[NDArray[np.intp], NDArray[np.bool_]]:
@@ -235,13 +245,3 @@ def nearest_outline(pixels: Array, estimate: Estimate) -> tuple[NDArray[np.intp]
     others = off.copy()
     others[np.arange(len(off)), nearest] = math.inf
     return nearest, others.min(axis=1) > 0.0
-
-
-def _clipped_level(fraction: float, scene: Scene, pose: Pose) -> float:
-    """The threshold as a fraction of a clipped patch's true peak, from the power and a usual albedo of the fundus."""
-    white = getattr(scene.sensor, "white", None)
-    if white is None:
-        return fraction
-    toward = scene.eye.intersect(pose.apex, pose.axis)
-    peak = _USUAL_ALBEDO / math.pi * scene.power.axial_intensity(scene.beam) / (float(toward) * 1e-3) ** 2
-    return min(fraction, fraction * white / max(peak, 1e-9))

@@ -1,0 +1,112 @@
+"""Rays across the outline of a patch: where the log light's gradients are those of the beam's own edge."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from functools import lru_cache
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from localize.profile import Profile
+from localize.rings import Overview, Plane
+from scene.beam import Beam
+from scene.pose import Pose
+from scene.scene import Scene
+
+Array = NDArray[np.float64]
+_RAYS = 36
+_BLUR = 0.03  # of the distance from the patch's middle to its outline, the unit of what follows
+_ALONG = np.arange(0.5, 1.43, 0.04)
+_INSIDE, _OUTSIDE = _ALONG < 0.7, _ALONG > 1.15
+_NEEDED = len(_ALONG) - 4  # samples of a ray that must be in the frame
+SHIFTS = 0.03 * np.arange(-8, 9)  #: of the outline that are tried
+_WHITE = 0.97
+#: of a clipped patch only the rim is seen, and its contrast is what explains the rim best
+_CLIPPED_CONTRASTS = (1.0, 4.0, 16.0, 64.0)
+
+
+@dataclass(frozen=True)
+class Rays:
+    """What rays across one spotlight's outline see."""
+
+    spotlight: int
+    middle: Array  #: `[2]` [px]
+    ends: Array  #: where the rays meet the outline `[N, 2]` [px]
+    left: Array  #: sums of absolute gradients without the light of the outline moved by `SHIFTS` `[N, S]`
+    total: Array  #: sums of absolute gradients `[N]`
+
+    def found(self) -> tuple[Array, Array]:
+        """Where each ray sees the outline `[N, 2]` [px], and the share of its gradients that says so `[N]`."""
+        row, k = np.arange(len(self.left)), np.argmin(self.left, axis=1)
+        inner = np.clip(k, 1, len(SHIFTS) - 2)
+        below, here, above = (self.left[row, inner + j] for j in (-1, 0, 1))
+        # sums of absolute values have a pointed minimum
+        tip = 0.5 * (below - above) / np.maximum(np.maximum(below, above) - here, 1e-9)
+        shift = SHIFTS[inner] + np.clip(tip, -0.5, 0.5) * (SHIFTS[1] - SHIFTS[0])
+        worth = np.where(k == inner, 1.0 - here / np.maximum(self.total, 1e-6), 0.0)
+        return self.middle + (1.0 + shift)[:, None] * (self.ends - self.middle), worth
+
+
+def rays_across(overview: Overview, scene: Scene, pose: Pose) -> list[Rays]:
+    """The rays across the outlines of the spotlights of which enough is in the frame."""
+    curves = (scene.camera.project(scene.outline(pose, k, _RAYS)) for k in range(len(scene.spotlights)))
+    found = [_across(overview, scene.beam, curve, k) for k, curve in enumerate(curves) if np.all(np.isfinite(curve))]
+    return [rays for rays in found if rays is not None]
+
+
+def _across(overview: Overview, beam: Beam, curve: Array, spotlight: int) -> Rays | None:
+    last = overview.light.shape[0] - 1.0
+    bins = curve / overview.step - 0.5
+    middle = bins.mean(axis=0)
+    at = middle + _ALONG[None, :, None] * (bins - middle)[:, None, :]
+    valid = np.all((at >= 0.0) & (at <= last), axis=2)
+    use = valid[:, :_NEEDED].all(axis=1)
+    if np.count_nonzero(use) < _RAYS // 4:
+        return None
+    at, valid = at[use], valid[use]
+    size = float(np.mean(np.linalg.norm(bins - middle, axis=1)))
+    blur = max(0.5, _BLUR * size)
+    light = _sampled(overview.light, at, blur)
+    ground = None if overview.reference is None else _sampled(overview.reference, at, blur)
+    log = overview.logarithm(light, ground).astype(float)
+    inside, outside = (float(np.median(log[:, part])) for part in (_INSIDE, _OUTSIDE))
+    fraction, profile = _profile(beam, round(math.hypot(blur, 0.4) / size, 2))
+    contrast = math.expm1(max(0.05, inside - outside)) / max(0.02, float(np.interp(0.6, fraction, profile)))
+    clipped = float(np.mean(light[:, _INSIDE] > _WHITE)) > 0.3
+    ceiling = math.log(1.0 + overview.floor) - outside if clipped else math.inf
+    shape = np.interp(_ALONG / (1.0 + SHIFTS[:, None]), fraction, profile)
+    kept = valid[:, 1:].astype(float)
+    steps = np.diff(log, axis=1) * kept
+    tried = []
+    for factor in _CLIPPED_CONTRASTS if clipped else (1.0,):
+        model = np.diff(np.minimum(np.log1p(factor * contrast * shape), ceiling), axis=1)
+        tried.append(np.abs(steps[:, None, :] - model * kept[:, None, :]).sum(axis=2))
+    left = min(tried, key=lambda sums: float(sums.min(axis=1).sum()))
+    return Rays(spotlight, (middle + 0.5) * overview.step, curve[use], left, np.abs(steps).sum(axis=1))
+
+
+def _sampled(plane: Plane, at: Array, blur: float) -> Plane:
+    """The blurred plane at points `[..., 2]` in its pixels' indices."""
+    side = plane.shape[0]
+    low = np.clip(np.floor(at.min(axis=(0, 1))).astype(int) - 3, 0, side - 2)
+    high = np.clip(np.ceil(at.max(axis=(0, 1))).astype(int) + 4, 2, side)
+    crop = cv2.GaussianBlur(plane[low[1] : high[1], low[0] : high[0]], (0, 0), blur)
+    x, y = (np.ascontiguousarray(at[..., k] - low[k], np.float32) for k in (0, 1))
+    return np.asarray(cv2.remap(crop, x, y, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE), np.float32)
+
+
+@lru_cache(maxsize=64)
+def _profile(beam: Beam, blur: float) -> tuple[Array, Array]:
+    """The beam's profile, blurred, over fractions of its half angle."""
+    profile = Profile.of(beam)
+    fraction = np.linspace(0.0, 2.0, 401)
+    angle = fraction * profile.half_angle
+    value = profile.value(np.cos(angle) if profile.cosine else -angle)
+    width = max(0.1, blur / (fraction[1] - fraction[0]))
+    reach = int(3.0 * width) + 1
+    kernel = np.exp(-0.5 * np.square(np.arange(-reach, reach + 1) / width))
+    mirrored = np.concatenate([value[reach:0:-1], value, np.zeros(reach)])
+    return fraction, np.convolve(mirrored, kernel / kernel.sum(), "valid")
