@@ -214,6 +214,4 @@ def _bend(
 
 def ambient_irradiance(sight: Sight, scene: Scene) -> Array:
     """The microscope's irradiance on what `sight` sees `[N]`, relative to that on a plane across its beam."""
-    tilt, azimuth = scene.ambient.tilt, scene.ambient.azimuth
-    towards = np.array([np.sin(tilt) * np.cos(azimuth), np.sin(tilt) * np.sin(azimuth), np.cos(tilt)])
-    return np.maximum(sight.normals @ towards, 0.0)
+    return np.maximum(sight.normals @ scene.ambient.towards, 0.0)

@@ -56,14 +56,8 @@ def aim(mi: Any, apex: Array, axis: Array) -> Any:
 def ambient(scene: Scene) -> dict[str, Any]:
     """The microscope's light: a collimated emitter with the stated irradiance [W/m2] across its beam."""
     light = scene.ambient
-    sideways = math.sin(light.tilt)
-    direction = [
-        -sideways * math.cos(light.azimuth),
-        -sideways * math.sin(light.azimuth),
-        -math.cos(light.tilt),
-    ]
     irradiance = spectral.emission(scene, light.illumination, light.irradiance, fundus.VITREOUS_LENGTH)
-    return {"type": "directional", "direction": direction, "irradiance": irradiance}
+    return {"type": "directional", "direction": (-light.towards).tolist(), "irradiance": irradiance}
 
 
 def through_water(scene: Scene, pose: Pose, axis: Array) -> list[float]:

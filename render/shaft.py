@@ -35,10 +35,6 @@ def placed(mi: Any, shaft: Shaft, pose: Pose) -> dict[str, Any]:
 
 def shaft_crop(scene: Scene, shaft: Shaft, pose: Pose) -> Crop:
     """The part of the frame where the shaft or its shadow can be seen."""
-    light = scene.ambient
-    downwards = -np.array(
-        [np.sin(light.tilt) * np.cos(light.azimuth), np.sin(light.tilt) * np.sin(light.azimuth), np.cos(light.tilt)]
-    )
     end, far = _ends(shaft, pose)
     # only what is in front of the camera can be projected
     top = min(far[2], scene.camera.height - 1.0)
@@ -46,7 +42,7 @@ def shaft_crop(scene: Scene, shaft: Shaft, pose: Pose) -> Crop:
         far = end + (far - end) * (top - end[2]) / (far[2] - end[2])
     rim = shaft.diameter / 2.0 * np.array([(x, y, z) for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)])
     body = np.concatenate([p + rim for p in np.linspace(end, far, 64)])
-    shadow = scene.surface.intersect(scene.eye, body, downwards)
+    shadow = scene.surface.intersect(scene.eye, body, -scene.ambient.towards)
     shadow = shadow[np.all(np.isfinite(shadow), axis=1)]
     return Crop.around(scene.camera.project(np.concatenate([body, shadow])), scene.camera.resolution, margin=2.0)
 

@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Annotated, Any, Literal
 
 import numpy as np
+from numpy.typing import NDArray
 from pydantic import BeforeValidator, Field, ValidationInfo, model_validator
 
 from scene.model import Model, unknown_name
@@ -142,3 +143,9 @@ class Ambient(Model):
     tilt: Annotated[Angle, Field(ge=0.0, lt=math.pi / 4.0)] = 0.0
     azimuth: Angle = 0.0
     illumination: Illumination = FlatBand()
+
+    @property
+    def towards(self) -> NDArray[np.float64]:
+        """Unit direction `[3]` from the retina to the light."""
+        across = math.sin(self.tilt)
+        return np.array([across * math.cos(self.azimuth), across * math.sin(self.azimuth), math.cos(self.tilt)])

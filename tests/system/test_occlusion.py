@@ -1,0 +1,61 @@
+"""Where the localizers expect the shaft and its shadow, against where Mitsuba renders them."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+
+from localize.forward import look, moved, window
+from localize.occlusion import covered
+from render import Renderer
+from scene import Camera, Scene
+from scene.illumination import Ambient
+from scene.retina import UniformRetina
+from scene.spotlights import Instrument, Shaft
+from scene.surface import Surface
+
+SIDE = 300
+TIPS = {"beside the middle": [3.0, 1.0, 4.0], "low": [-2.0, -1.5, 1.0]}
+LIGHTS = {"from the camera": (0.0, 0.0), "from the side": (20.0, 100.0), "along the shaft": (15.0, 0.0)}
+
+
+def scene_of(tilt, azimuth, **parts):
+    ambient = Ambient(irradiance=2.0, tilt=math.radians(tilt), azimuth=math.radians(azimuth))
+    instrument = Instrument(shaft=Shaft(length=12.0, albedo=0.0))
+    given = {"camera": Camera(resolution=SIDE), "retina": UniformRetina(), "instrument": instrument}
+    return Scene(ambient=ambient, **given, **parts)
+
+
+@pytest.mark.parametrize("light", LIGHTS)
+@pytest.mark.parametrize("tip", TIPS)
+def test_every_pixel_the_shaft_or_its_shadow_changes_is_covered_and_hardly_another(light, tip):
+    scene = scene_of(*LIGHTS[light])
+    pose = scene.pose(np.array(TIPS[tip]))
+    renderer = Renderer(scene, samples=32)
+    change = np.abs(renderer.background(pose) / renderer.background() - 1.0)[..., 0]
+    sight = look(scene, window(0, 0, SIDE, SIDE))
+    mask = covered(sight, pose, scene, slack=0.0).reshape(SIDE, SIDE)
+    assert (change > 0.5).sum() > 500
+    assert not np.any((change > 0.01) & ~mask)
+    # all of it black but for a rim of 1.3 pixels
+    inside = covered(sight, pose, scene, slack=-0.1).reshape(SIDE, SIDE)
+    assert change[inside].min() > 0.9
+    assert inside.sum() > 0.5 * mask.sum()
+
+
+def test_slack_covers_a_shaft_that_is_a_little_elsewhere():
+    scene = scene_of(20.0, 100.0, surface=Surface(semi_axes=(1.0, 1.0, 1.1)))
+    pose = scene.pose(np.array([1.0, 0.5, 3.0]))
+    sight = look(scene, window(0, 0, SIDE, SIDE))
+    true = covered(sight, pose, scene, slack=0.0)
+    for step in np.vstack([0.04 * np.eye(3), -0.04 * np.eye(3)]):
+        there = moved(pose, np.array([*step, 0.0, 0.0]))
+        assert not np.any(true & ~covered(sight, there, scene, slack=0.05))
+    assert true.sum() < covered(sight, pose, scene).sum() < 1.5 * true.sum()
+
+
+def test_without_a_shaft_nothing_is_covered():
+    scene = Scene(camera=Camera(resolution=50))
+    assert not covered(look(scene, window(0, 0, 50, 50)), scene.pose(np.array([0.0, 0.0, 4.0])), scene).any()
