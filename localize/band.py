@@ -1,36 +1,37 @@
 """Maximum likelihood on a band of bins along the outlines, cut into strips across the edge with an albedo of their own.
 
 In each strip the log albedo is a level and a slope, both eliminated: a vessel or a shade that crosses the edge changes
-both sides alike and leaves the edge where it is. What remains is the position of the beam's own profile.
+both sides alike and leaves the edge where it is. How much levels and slopes scatter is learnt from the band itself.
+What remains is the position of the beam's own profile.
 """
 
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import cv2
 import numpy as np
 from numpy.typing import NDArray
 
 from localize.forward import ambient_irradiance, look
-from localize.noise import NoiseModel, SensorNoise, linear_light
+from localize.noise import NoiseModel, linear_light
 from localize.outline import distances
 from localize.prior import Estimate, Knowns, prior_rows
-from localize.solve import rest, student_weights
+from localize.solve import rest, student_bend, student_weights
 from localize.start import nearest_outline
+from localize.strips import Eliminated, Strips, score_covariance, strip_scores
 from localize.view import spotlight_irradiance
 
 Array = NDArray[np.float64]
 _STRIP_BINS = 2.0  # width of a strip along the outline
-_SLOPE_PER_MM = 3.0  # rms gradient of a fundus' log albedo in green light
-_LEVEL = 1.0  # spread of the strips' log albedo
+#: where the spreads of the strips' log albedo start: level, and gradient per mm of a fundus in green light
+_LEVEL, _SLOPE_PER_MM = 0.3, 3.0
+_SMALLEST = 1e-3  # spread of levels, and of slopes over the width of the band
 _LONGEST_STEP_BINS = 3.0
 _FEWEST = 40  # bins
-#: rounded values share their error along the whole rim: measured on clipped 8-bit frames, not derived
-_ROUNDED_INFLATION = 9.0
 _DONE_SIGMAS = 0.05  # a step this short ends the iterations
-#: a last step longer than this, in sigmas of uncorrelated residuals, means that the fit does not settle
+#: a last step longer than this, in sigmas of the fit, means that the fit does not settle
 SETTLED_SIGMAS = 1.0
 
 
@@ -39,20 +40,96 @@ class BandFit:
     """A fitted band."""
 
     estimate: Estimate
-    information: Array  #: of the pose and the free quantities `[P, P]`, priors included
+    information: (
+        Array  #: of the pose and the free quantities `[P, P]`, priors included, if all bins erred by themselves
+    )
+    covariance: Array  #: of the same `[P, P]`, as the strips' residuals show it
     gains: tuple[float, ...]  #: log of the spotlights' intensity over the ambient irradiance, a channel each
     misfit: float  #: rms of the residuals, outliers cut, over what the model expects
     settled: bool
     covered: float  #: share of the outlines that the band shows
-    correlation: float  #: how much larger slow residuals along the outline are than independent strips would give
+
+    @property
+    def correlation(self) -> float:
+        """How much larger the covariance is than if all bins erred by themselves."""
+        return float(np.trace(self.covariance @ self.information)) / len(self.information)
 
 
 @dataclass(frozen=True)
-class _Bins:
-    pixels: Array  #: centres `[N, 2]` [px]
+class _Band:
+    pixels: Array  #: centres of the bins `[N, 2]` [px]
     signal: Array  #: `[C, N]` [white]
     usable: NDArray[np.bool_]  #: `[C, N]`
     clipped: NDArray[np.bool_]  #: `[C, N]`
+    strips: Strips
+    covered: float  #: share of the outlines in the frame
+
+
+@dataclass
+class _Channel:
+    """One channel's nuisances, and its bins' residuals as they stand."""
+
+    signal: Array
+    usable: NDArray[np.bool_]
+    clipped: NDArray[np.bool_]
+    strips: Strips
+    noise: NoiseModel
+    bins: int  #: pixels in a bin
+    gain: float  #: log of the spotlights' intensity over the ambient irradiance
+    spread: Array  #: prior sigma of levels and slopes `[2]`
+    smallest: Array  #: `[2]`
+    level: float = math.nan  #: log albedo of all strips
+    levels: Array = field(default_factory=lambda: np.zeros((0, 2)))  #: of each strip beyond it, and slope `[S, 2]`
+    white: float = 0.05  #: what residuals scatter beyond the sensor's noise
+
+    def evaluate(self, irradiance: Array, light: Array, rows: Array) -> None:
+        """Residuals, weights and Jacobian where the spotlights' light is `light` `[N]` with derivatives `rows`."""
+        g = math.exp(self.gain)
+        brightness = irradiance + g * light
+        if math.isnan(self.level):
+            ratio = self.strips.sums(np.where(self.usable, np.clip(self.signal / brightness, 0.0, None), 0.0))
+            number = self.strips.sums(self.usable.astype(float))
+            overall = max(float(ratio.sum() / max(number.sum(), 1.0)), 1e-9)
+            mean = np.where(number > 0, ratio / np.maximum(number, 1.0), overall)
+            self.level = math.log(overall)
+            self.levels = np.stack([np.log(np.clip(mean / overall, 0.05, 20.0)), np.zeros(len(mean))], axis=1)
+        model = np.exp(self.level + self.strips.log_albedo(self.levels)) * brightness
+        relative = self.signal / model - 1.0
+        residual = np.where(np.abs(relative) < 0.5, relative, np.log(np.maximum(self.signal, 0.02 * model) / model))
+        bound = self.clipped & (model < 1.0)
+        residual[bound] = -np.log(np.maximum(model[bound], 1e-6))
+        use = self.usable | bound
+        variance = self.noise.variance(model) / self.bins / np.square(np.maximum(model, 1e-9))
+        # the scatter that counts is that of the bins which hold the edge, and it tells how far the edge still is off
+        pull = np.abs(rows[2]) / brightness
+        steady = use & (pull > 0.3 * np.quantile(pull, 0.98))
+        if np.count_nonzero(steady) > 30:
+            self.white = rest(residual[steady], variance[steady], self.white)
+        variance = variance + self.white**2
+        whitened = residual / np.sqrt(variance)
+        self.weights = use / variance * student_weights(whitened)
+        self.misfit = float(np.sqrt(np.mean(np.minimum(np.square(whitened[use]), 25.0)))) if use.any() else math.inf
+        self.jacobian = np.concatenate(
+            [g / brightness * rows, (g / brightness * light)[None], np.ones((1, len(model)))]
+        )
+        self.residual = residual
+        # a robust fit follows its data by the slope of their influence, where least squares goes by the weight
+        effect = self.weights * np.square(self.jacobian[-2])
+        self.follows = max(0.3, float(np.sum(effect * student_bend(whitened)) / max(np.sum(effect), 1e-300)))
+
+    def eliminated(self) -> Eliminated:
+        """The normal equations of pose, free quantities, gain and level without the strips' own levels."""
+        data = self.residual + self.strips.log_albedo(self.levels)
+        return Eliminated.of(self.strips, self.jacobian, data, self.weights, self.spread)
+
+    def learn(self, part: Eliminated, step: Array) -> None:
+        """Take a step `[P]`: gain, level, the strips' levels and, from those, how much they scatter (MacKay 1992)."""
+        self.gain += float(step[-2])
+        self.level += float(step[-1])
+        self.levels = part.levels(step)
+        known = np.maximum(1.0 - part.variance / self.spread**2, 0.0).sum(axis=0)
+        found = np.sqrt(np.square(self.levels).sum(axis=0) / np.maximum(known, 1.0))
+        self.spread = np.clip(found, self.smallest, 5.0 * self.spread)
 
 
 def fit_band(
@@ -78,92 +155,100 @@ def fit_band(
     pose_size = 6 if roll else 5
     size = pose_size + len(knowns.free)
     used = Knowns(0.0, *list(vars(knowns).values())[1:]) if tied else knowns
-    found = _band(image, estimate, side, inner, outer)
-    if found is None:
+    band = _band(image, estimate, side, inner, outer)
+    if band is None:
         return None
-    bins, strips, count, offset, covered = found
-    sight = look(nominal, bins.pixels, side)
+    sight = look(nominal, band.pixels, side)
     irradiance = ambient_irradiance(sight, nominal)
-    whites = [0.05] * len(bins.signal)
     pitch = nominal.camera.pixel_pitch * side
-    precision = np.array([1.0 / _LEVEL**2, 1.0 / (_SLOPE_PER_MM * pitch) ** 2])
-    levels = [np.zeros((count, 2)) for _ in bins.signal]
-    gain = list(gains)
-    rounded = isinstance(noise, SensorNoise) and noise.electrons is None
-    dark_bins = max(1.0, outer * _STRIP_BINS)
-    settled, misfits, information, correlation = False, [math.inf], np.eye(size), 1.0
+    channels: list[_Channel] = []
+    information, pj, step = np.eye(size), np.zeros((0, size)), np.zeros(size)
     for turn in range(iterations):
-        value_, rows = spotlight_irradiance(sight, estimate, knowns, bins.pixels, side, roll=roll)
-        if not gain:
-            gain = [
-                _first_gain(s, u, irradiance, value_, offset) for s, u in zip(bins.signal, bins.usable, strict=True)
-            ]
+        light, rows = spotlight_irradiance(sight, estimate, knowns, band.pixels, side, roll=roll)
+        if turn == 0:
+            for c, signal in enumerate(band.signal):
+                gain = gains[c] if gains else _first_gain(signal, band.usable[c], irradiance, light, band.strips.offset)
+                spread = np.array([_LEVEL, _SLOPE_PER_MM * pitch])
+                smallest = np.array([_SMALLEST, _SMALLEST / (inner + outer)])
+                channels.append(
+                    _Channel(
+                        signal, band.usable[c], band.clipped[c], band.strips, noise, side**2, gain, spread, smallest
+                    )
+                )
         pr, pj = prior_rows(estimate, nominal, used, pose_size)
         information, gradient = pj.T @ pj, -pj.T @ pr
-        solved, misfits, slow = [], [], []
-        for c, signal in enumerate(bins.signal):
-            usable, clipped = bins.usable[c], bins.clipped[c]
-            g = math.exp(gain[c])
-            brightness = irradiance + g * value_
-            if turn == 0:
-                levels[c][:, 0] = _levels(signal / brightness, usable, strips, count)
-            known = levels[c][strips, 0] + levels[c][strips, 1] * offset
-            model = np.exp(known) * brightness
-            relative = signal / model - 1.0
-            residual = np.where(np.abs(relative) < 0.5, relative, np.log(np.maximum(signal, 0.02 * model) / model))
-            bound = clipped & (model < 1.0)
-            residual[bound] = -np.log(np.maximum(model[bound], 1e-6))
-            use = usable | bound
-            variance = noise.variance(model) / side**2 / np.square(np.maximum(model, 1e-9))
-            if rounded:
-                # nearly equal values are rounded alike: a strip's dark side counts once, not once a bin
-                variance = np.where(value_ > 0.0, variance, variance * dark_bins)
-            steady = use & (value_ > 0.0)
-            if turn > 0 and np.count_nonzero(steady) > 30:
-                whites[c] = rest(residual[steady], variance[steady], whites[c])
-            variance = variance + whites[c] ** 2
-            whitened = residual / np.sqrt(variance)
-            weights = use / variance * student_weights(whitened)
-            misfits.append(
-                float(np.sqrt(np.mean(np.minimum(np.square(whitened[use]), 25.0)))) if use.any() else math.inf
-            )
-            jacobian = np.concatenate([g / brightness * rows, (g / brightness * value_)[None]])
-            part = _eliminate(jacobian, residual + known, weights, strips, count, offset, precision)
-            solved.append(part)
-            full, grad = part.information, part.gradient
-            pivot = max(float(full[-1, -1]), 1e-12)
-            information = information + full[:-1, :-1] - np.outer(full[:-1, -1], full[-1, :-1]) / pivot
-            gradient = gradient + grad[:-1] - full[:-1, -1] * grad[-1] / pivot
-            slow.append(_slow_share(residual * weights, brightness, strips, count))
-        correlation = float(np.mean(slow)) * (_ROUNDED_INFLATION if rounded else 1.0)
-        scale = np.sqrt(np.maximum(np.diag(information), 1e-300))
-        try:
-            step = np.linalg.solve(information / np.outer(scale, scale), gradient / scale) / scale
-        except np.linalg.LinAlgError:
+        parts = []
+        for channel in channels:
+            channel.evaluate(irradiance, light, rows)
+            part = channel.eliminated()
+            reduced = _reduction(part.information, size)
+            parts.append(part)
+            information = information + reduced @ part.information @ reduced.T
+            gradient = gradient + reduced @ part.gradient
+        solved = _solved(information, gradient)
+        if solved is None:
             return None
-        if not np.all(np.isfinite(step)):
-            return None
+        step = solved
         reach = float(np.max(np.abs(step[:3])))
         step = step / max(1.0, reach / max(0.1, _LONGEST_STEP_BINS * pitch), float(np.max(np.abs(step[3:5]))) / 0.05)
         estimate = estimate.moved(step, pose_size, knowns.free)
-        for c, part in enumerate(solved):
-            own = float((part.gradient[-1] - part.information[-1, :-1] @ step) / max(part.information[-1, -1], 1e-12))
-            own = float(np.clip(own, -1.0, 1.0))
-            gain[c] += own
-            levels[c] = part.levels(np.append(step, own))
-        length = math.sqrt(max(0.0, float(step @ information @ step)))
-        settled = length < SETTLED_SIGMAS * math.sqrt(correlation)
-        if length < _DONE_SIGMAS and turn >= 2:
+        for channel, part in zip(channels, parts, strict=True):
+            own = _solved(part.information[size:, size:], part.gradient[size:] - part.information[size:, :size] @ step)
+            channel.learn(part, np.append(step, np.zeros(2) if own is None else np.clip(own, -1.0, 1.0)))
+        length = float(step @ information @ step)
+        if length < _DONE_SIGMAS**2 and turn >= 2:
             break
+    covariance = _covariance(channels, information, pj, estimate)
+    if covariance is None:
+        return None
+    settled = float(step @ np.linalg.solve(covariance, step)) < SETTLED_SIGMAS**2
+    misfit = float(np.sqrt(np.mean(np.square([channel.misfit for channel in channels]))))
     return BandFit(
-        estimate, information, tuple(gain), float(np.sqrt(np.mean(np.square(misfits)))), settled, covered, correlation
+        estimate, information, covariance, tuple(channel.gain for channel in channels), misfit, settled, band.covered
     )
 
 
-def _band(
-    image: NDArray[np.generic], estimate: Estimate, side: int, inner: float, outer: float
-) -> tuple[_Bins, NDArray[np.intp], int, Array, float] | None:
-    """The bins along the outlines, their strips and how many, distances from the outline in bins, coverage."""
+def _reduction(information: Array, size: int) -> Array:
+    """The rows `[size, P]` that take the last parameters out of normal equations `[P, P]`."""
+    nuisance = information[size:, size:] + 1e-9 * np.diag(np.diag(information)[size:] + 1e-300)
+    return np.concatenate([np.eye(size), -np.linalg.solve(nuisance, information[size:, :size]).T], axis=1)
+
+
+def _solved(information: Array, gradient: Array) -> Array | None:
+    scale = np.sqrt(np.maximum(np.diag(information), 1e-300))
+    try:
+        step: Array = np.linalg.solve(information / np.outer(scale, scale), gradient / scale) / scale
+    except np.linalg.LinAlgError:
+        return None
+    return step if np.all(np.isfinite(step)) else None
+
+
+def _covariance(channels: list[_Channel], information: Array, prior: Array, estimate: Estimate) -> Array | None:
+    """The covariance `[P, P]` of pose and free quantities, as the strips' residuals show it (a sandwich estimate)."""
+    size = len(information)
+    count = channels[0].strips.count
+    scores, parts = np.zeros((count, size)), np.zeros((count, size, size))
+    for channel in channels:
+        part = channel.eliminated()
+        reduced = _reduction(part.information, size)
+        gradient, own = strip_scores(
+            channel.strips, channel.jacobian, channel.residual, channel.weights, channel.levels, channel.spread
+        )
+        scores = scores + gradient @ reduced.T / channel.follows
+        parts = parts + reduced @ own @ reduced.T
+    outward = np.zeros(size)
+    outward[:3] = -estimate.pose.axis
+    meat = score_covariance(channels[0].strips, scores, parts, outward)
+    scale = np.sqrt(np.maximum(np.diag(information), 1e-300))
+    try:
+        bread = np.linalg.inv(information / np.outer(scale, scale)) / np.outer(scale, scale)
+    except np.linalg.LinAlgError:
+        return None
+    return np.asarray(bread @ (meat + prior.T @ prior) @ bread)
+
+
+def _band(image: NDArray[np.generic], estimate: Estimate, side: int, inner: float, outer: float) -> _Band | None:
+    """The bins along the outlines, sorted by their strips; None if too few are in the frame."""
     scene = estimate.scene
     edge = scene.camera.resolution // side
     curves, seen = [], []
@@ -207,14 +292,19 @@ def _band(
         found[0].append(plane[row, column].astype(float))
         found[1].append(share[row, column] == 0.0)
         found[2].append(share[row, column] == 1.0)
-    strips, count = _strips(pixels, spots, curves, side, len(scene.spotlights))
-    bins = _Bins(pixels, np.stack(found[0]), np.stack(found[1]).astype(bool), np.stack(found[2]).astype(bool))
-    return bins, strips, count, distance, float(np.mean(seen))
+    index = _strip_of(pixels, spots, curves, side, len(scene.spotlights))
+    order = np.argsort(index, kind="stable")
+    _, first, compact = np.unique(index[order], return_index=True, return_inverse=True)
+    spot = spots[order][first]
+    turns = tuple(slice(*np.searchsorted(spot, [k, k + 1])) for k in np.unique(spot))
+    strips = Strips(compact, distance[order], first, turns)
+    planes = [np.stack(plane)[:, order] for plane in found]
+    return _Band(pixels[order], planes[0], planes[1].astype(bool), planes[2].astype(bool), strips, float(np.mean(seen)))
 
 
-def _strips(
+def _strip_of(
     pixels: Array, spots: NDArray[np.intp], curves: list[Array], side: int, spotlights: int
-) -> tuple[NDArray[np.intp], int]:
+) -> NDArray[np.intp]:
     """Strips of equal angle about each patch's middle, about `_STRIP_BINS` wide on the outline."""
     perimeter = max(float(np.sum(np.linalg.norm(np.diff(c, axis=0, append=c[:1]), axis=1))) for c in curves)
     per_spot = max(8, int(perimeter / _STRIP_BINS))
@@ -226,56 +316,7 @@ def _strips(
         middle = 0.5 * (pixels[mine].min(axis=0) + pixels[mine].max(axis=0))
         angle = np.arctan2(pixels[mine, 1] - middle[1], pixels[mine, 0] - middle[0]) + math.pi
         result[mine] = k * per_spot + np.minimum((angle * per_spot / (2.0 * math.pi)).astype(np.intp), per_spot - 1)
-    return result, per_spot * spotlights
-
-
-@dataclass(frozen=True)
-class _Strips:
-    information: Array  #: `[P, P]`
-    gradient: Array  #: `[P]`
-    gain: Array  #: `[count, 2, P]`
-    start: Array  #: `[count, 2]`
-
-    def levels(self, step: Array) -> Array:
-        """Level and slope of every strip `[count, 2]` after `step`."""
-        return np.asarray(self.start - self.gain @ step)
-
-
-def _eliminate(
-    jacobian: Array, data: Array, weights: Array, strips: NDArray[np.intp], count: int, offset: Array, precision: Array
-) -> _Strips:
-    """Normal equations with every strip's level and slope eliminated."""
-
-    def sums(x: Array) -> Array:
-        return np.asarray(np.bincount(strips, weights=x, minlength=count), float)
-
-    wo = weights * offset
-    a, b, d = sums(weights) + precision[0], sums(wo), sums(wo * offset) + precision[1]
-    det = a * d - b * b
-    columns = [*jacobian, data]
-    right = np.stack([np.stack([sums(weights * x), sums(wo * x)]) for x in columns], axis=-1)  # [2, count, P + 1]
-    solved = np.stack(
-        [(d[:, None] * right[0] - b[:, None] * right[1]), (a[:, None] * right[1] - b[:, None] * right[0])]
-    )
-    solved /= det[:, None]
-    weighted = jacobian * weights
-    size = len(jacobian)
-    cross = np.einsum("kcp,kcq->pq", right, solved)
-    return _Strips(
-        weighted @ jacobian.T - cross[:size, :size],
-        weighted @ data - cross[:size, size],
-        np.moveaxis(solved[:, :, :size], 0, 1),
-        solved[:, :, size].T,
-    )
-
-
-def _levels(ratio: Array, usable: NDArray[np.bool_], strips: NDArray[np.intp], count: int) -> Array:
-    """A first log albedo for every strip: the logarithm of its mean ratio of signal to predicted brightness."""
-    total = np.bincount(strips, weights=np.where(usable, np.clip(ratio, 0.0, None), 0.0), minlength=count)
-    number = np.bincount(strips, weights=usable, minlength=count)
-    overall = max(float(total.sum() / max(number.sum(), 1.0)), 1e-9)
-    mean = np.where(number > 0, total / np.maximum(number, 1.0), overall)
-    return np.asarray(np.log(np.clip(mean, 0.05 * overall, 20.0 * overall)), float)
+    return result
 
 
 def _first_gain(signal: Array, usable: NDArray[np.bool_], irradiance: Array, light_: Array, offset: Array) -> float:
@@ -286,12 +327,3 @@ def _first_gain(signal: Array, usable: NDArray[np.bool_], irradiance: Array, lig
     albedo = max(float(np.median(signal[outside] / irradiance[outside])), 1e-6)
     excess = float(np.median((signal[inside] / albedo - irradiance[inside]) / light_[inside]))
     return math.log(max(excess, 1e-3 / float(light_.max())))
-
-
-def _slow_share(score: Array, brightness: Array, strips: NDArray[np.intp], count: int) -> float:
-    """Power of the residuals' slow harmonics along the outline over that of independent strips, at least 1."""
-    series = np.bincount(strips, weights=score * (brightness > 1.5), minlength=count)
-    power = np.square(np.abs(np.fft.rfft(series)))
-    if len(power) < 16 or not np.any(power > 0.0):
-        return 1.0
-    return float(np.clip(np.mean(power[3:12]) / max(float(np.mean(power[3:])), 1e-300), 1.0, 30.0))

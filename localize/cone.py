@@ -43,16 +43,15 @@ def cone(
     fit = fit_edge(image, scene, start, known, sensor)
     if isinstance(fit, str):
         return LocalizationFailure(fit)
+    return edge_outcome(fit, scene, known)
+
+
+def edge_outcome(fit: BandFit, scene: Scene, knowns: Knowns) -> Outcome:
+    """The localization an edge fit stands for, or why it may not be believed."""
     return judged(
-        fit.estimate,
-        fit.information,
-        fit.correlation,
-        scene,
-        known,
-        misfit=fit.misfit,
-        covered=fit.covered,
-        settled=fit.settled,
-    )
+        fit.estimate, np.asarray(np.linalg.inv(fit.covariance)), 1.0, scene, knowns,
+        misfit=fit.misfit, covered=fit.covered, settled=fit.settled,
+    )  # fmt: skip
 
 
 def is_sharp(scene: Scene) -> bool:

@@ -10,7 +10,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from localize.cone import fit_edge, is_clipped, is_sharp
+from localize.cone import edge_outcome, fit_edge, is_clipped, is_sharp
 from localize.field import Field, FieldFit, fit_field
 from localize.noise import NoiseModel, noise_of
 from localize.outcome import LocalizationFailure, Outcome
@@ -47,10 +47,7 @@ def photometric(
         edge = fit_edge(image, scene, start, known, sensor)
         if isinstance(edge, str):
             return LocalizationFailure(edge)
-        return judged(
-            edge.estimate, edge.information, edge.correlation, scene, known,
-            misfit=edge.misfit, covered=edge.covered, settled=edge.settled,
-        )  # fmt: skip
+        return edge_outcome(edge, scene, known)
     fit = fit_patch(image, scene, start, known, sensor, reference, frames)
     if isinstance(fit, str):
         return LocalizationFailure(fit)

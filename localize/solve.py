@@ -20,6 +20,12 @@ def student_weights(residuals: Array) -> Array:
     return np.asarray((STUDENT + 1.0) / (STUDENT + np.square(residuals)))
 
 
+def student_bend(residuals: Array) -> Array:
+    """Slope of the influence of whitened residuals over their weight: 1 for small ones, -1 for gross errors."""
+    square = np.square(residuals)
+    return np.asarray((STUDENT - square) / (STUDENT + square))
+
+
 def spread(residuals: Array) -> float:
     """Robust standard deviation: 1.4826 times the median absolute value."""
     return 1.4826 * float(np.median(np.abs(residuals))) if len(residuals) else 0.0
