@@ -31,8 +31,9 @@ def trace(loaded: Any, pixels: NDArray[np.uint32], resolution: int, samples: int
     columns = max(d for d in range(1, int(samples**0.5) + 1) if samples % d == 0)
     x = mi.Float(pixel % resolution) + (mi.Float(k % columns) + random.next_float32()) / columns
     y = mi.Float(pixel // resolution) + (mi.Float(k // columns) + random.next_float32()) * (columns / samples)
-    # cells and wavelengths are paired at random, or colours would lie across the pixel
-    wavelength = (mi.Float(mi.permute_kensler(k, samples, first)) + random.next_float32()) / samples
+    # a ray carries four wavelengths, each a quarter of the range from the next: cells of a quarter tell them all apart.
+    # Cells of area and of wavelength are paired at random, or colours would lie across the pixel.
+    wavelength = (mi.Float(mi.permute_kensler(k, samples, first)) + random.next_float32()) / (4 * samples)
     bounces = mi.load_dict({"type": "independent"})
     bounces.seed(seed, len(pixels) * samples)
     # the sensor takes a place in units of its film's crop, which is one pixel
