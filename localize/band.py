@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, field
+from functools import cached_property
 
 import cv2
 import numpy as np
@@ -33,26 +34,6 @@ _FEWEST = 40  # bins
 _DONE_SIGMAS = 0.05  # a step this short ends the iterations
 #: a last step longer than this, in sigmas of the fit, means that the fit does not settle
 SETTLED_SIGMAS = 1.0
-
-
-@dataclass(frozen=True)
-class BandFit:
-    """A fitted band."""
-
-    estimate: Estimate
-    information: (
-        Array  #: of the pose and the free quantities `[P, P]`, priors included, if all bins erred by themselves
-    )
-    covariance: Array  #: of the same `[P, P]`, as the strips' residuals show it
-    gains: tuple[float, ...]  #: log of the spotlights' intensity over the ambient irradiance, a channel each
-    misfit: float  #: rms of the residuals, outliers cut, over what the model expects
-    settled: bool
-    covered: float  #: share of the outlines that the band shows
-
-    @property
-    def correlation(self) -> float:
-        """How much larger the covariance is than if all bins erred by themselves."""
-        return float(np.trace(self.covariance @ self.information)) / len(self.information)
 
 
 @dataclass(frozen=True)
@@ -122,6 +103,10 @@ class _Channel:
         data = self.residual + self.strips.log_albedo(self.levels)
         return Eliminated.of(self.strips, self.jacobian, data, self.weights, self.spread)
 
+    def scores(self) -> tuple[Array, Array]:
+        """The strips' own gradients `[S, P]` and informations `[S, P, P]`."""
+        return strip_scores(self.strips, self.jacobian, self.residual, self.weights, self.levels, self.spread)
+
     def learn(self, part: Eliminated, step: Array) -> None:
         """Take a step `[P]`: gain, level, the strips' levels and, from those, how much they scatter (MacKay 1992)."""
         self.gain += float(step[-2])
@@ -130,6 +115,55 @@ class _Channel:
         known = np.maximum(1.0 - part.variance / self.spread**2, 0.0).sum(axis=0)
         found = np.sqrt(np.square(self.levels).sum(axis=0) / np.maximum(known, 1.0))
         self.spread = np.clip(found, self.smallest, 5.0 * self.spread)
+
+
+@dataclass(frozen=True)
+class BandFit:
+    """A fitted band."""
+
+    estimate: Estimate
+    information: (
+        Array  #: of the pose and the free quantities `[P, P]`, priors included, if all bins erred by themselves
+    )
+    prior: Array  #: the priors' whitened rows `[Q, P]`
+    step: Array  #: the last `[P]`
+    channels: tuple[_Channel, ...]
+    covered: float  #: share of the outlines that the band shows
+
+    @property
+    def gains(self) -> tuple[float, ...]:
+        """Log of the spotlights' intensity over the ambient irradiance, a channel each."""
+        return tuple(channel.gain for channel in self.channels)
+
+    @property
+    def misfit(self) -> float:
+        """Rms of the residuals, outliers cut, over what the model expects."""
+        return float(np.sqrt(np.mean(np.square([channel.misfit for channel in self.channels]))))
+
+    @property
+    def settled(self) -> bool:
+        """Whether the last step was short."""
+        return float(self.step @ np.linalg.solve(self.covariance, self.step)) < SETTLED_SIGMAS**2
+
+    @property
+    def correlation(self) -> float:
+        """How much larger the covariance is than if all bins erred by themselves."""
+        return float(np.trace(self.covariance @ self.information)) / len(self.information)
+
+    @cached_property
+    def covariance(self) -> Array:
+        """Covariance of the pose and the free quantities `[P, P]` as the strips' residuals show it (a sandwich)."""
+        size, strips = len(self.information), self.channels[0].strips
+        scores, parts = np.zeros((strips.count, size)), np.zeros((strips.count, size, size))
+        for channel in self.channels:
+            gradient, own = channel.scores()
+            reduced = _reduction(own.sum(axis=0), size)
+            scores = scores + gradient @ reduced.T / channel.follows
+            parts = parts + reduced @ own @ reduced.T
+        meat = score_covariance(strips, scores, parts) + self.prior.T @ self.prior
+        scale = np.sqrt(np.maximum(np.diag(self.information), 1e-300))
+        bread = np.linalg.inv(self.information / np.outer(scale, scale)) / np.outer(scale, scale)
+        return np.asarray(bread @ meat @ bread)
 
 
 def fit_band(
@@ -198,14 +232,7 @@ def fit_band(
         length = float(step @ information @ step)
         if length < _DONE_SIGMAS**2 and turn >= 2:
             break
-    covariance = _covariance(channels, information, pj, estimate)
-    if covariance is None:
-        return None
-    settled = float(step @ np.linalg.solve(covariance, step)) < SETTLED_SIGMAS**2
-    misfit = float(np.sqrt(np.mean(np.square([channel.misfit for channel in channels]))))
-    return BandFit(
-        estimate, information, covariance, tuple(channel.gain for channel in channels), misfit, settled, band.covered
-    )
+    return BandFit(estimate, information, pj, step, tuple(channels), band.covered)
 
 
 def _reduction(information: Array, size: int) -> Array:
@@ -221,30 +248,6 @@ def _solved(information: Array, gradient: Array) -> Array | None:
     except np.linalg.LinAlgError:
         return None
     return step if np.all(np.isfinite(step)) else None
-
-
-def _covariance(channels: list[_Channel], information: Array, prior: Array, estimate: Estimate) -> Array | None:
-    """The covariance `[P, P]` of pose and free quantities, as the strips' residuals show it (a sandwich estimate)."""
-    size = len(information)
-    count = channels[0].strips.count
-    scores, parts = np.zeros((count, size)), np.zeros((count, size, size))
-    for channel in channels:
-        part = channel.eliminated()
-        reduced = _reduction(part.information, size)
-        gradient, own = strip_scores(
-            channel.strips, channel.jacobian, channel.residual, channel.weights, channel.levels, channel.spread
-        )
-        scores = scores + gradient @ reduced.T / channel.follows
-        parts = parts + reduced @ own @ reduced.T
-    outward = np.zeros(size)
-    outward[:3] = -estimate.pose.axis
-    meat = score_covariance(channels[0].strips, scores, parts, outward)
-    scale = np.sqrt(np.maximum(np.diag(information), 1e-300))
-    try:
-        bread = np.linalg.inv(information / np.outer(scale, scale)) / np.outer(scale, scale)
-    except np.linalg.LinAlgError:
-        return None
-    return np.asarray(bread @ (meat + prior.T @ prior) @ bread)
 
 
 def _band(image: NDArray[np.generic], estimate: Estimate, side: int, inner: float, outer: float) -> _Band | None:

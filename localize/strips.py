@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -11,7 +10,7 @@ from numpy.typing import NDArray
 Array = NDArray[np.float64]
 #: harmonics of the outline that the pose changes: what a fit leaves of them says nothing of what they were
 _FITTED = 3
-_KNEES = (2.0, 5.0, 12.0, 30.0)  # harmonics above which neighbouring strips err independently
+_KNEES = np.array([1.0, 2.0, 4.0, 8.0, 16.0, 32.0])  # harmonics above which neighbouring strips err independently
 
 
 @dataclass(frozen=True)
@@ -95,46 +94,54 @@ def strip_scores(
     return gradient.T, np.moveaxis(information, 2, 0)
 
 
-def score_covariance(strips: Strips, scores: Array, parts: Array, outward: Array) -> Array:
+def score_covariance(strips: Strips, scores: Array, parts: Array) -> Array:
     """Covariance `[P, P]` of the sum of the strips' gradients `[S, P]`, estimated from what they are.
 
-    A strip knows one thing, how far its edge is displaced. These displacements over their own sigma are a series
-    around the outline, whose power in each harmonic tells how far neighbours err together. `parts` `[S, P, P]` are
-    the strips' informations, `outward` `[P]` a change of the parameters that widens every outline.
+    A strip knows first of all how far its edge is displaced, then how wide it is: the principal directions of its
+    information, one of `parts` `[S, P, P]`. What it says in each over its own sigma is a series around the outline,
+    whose power in each harmonic tells how far neighbours err together.
     """
     scale = np.sqrt(np.maximum(np.einsum("spp->p", parts), 1e-300))
-    value, vector = np.linalg.eigh(parts / np.outer(scale, scale))
-    value, vector = np.maximum(value[:, -1], 0.0), vector[:, :, -1]
-    vector = vector * np.where(vector @ (outward * scale) < 0.0, -1.0, 1.0)[:, None]
-    share = np.sqrt(value)[:, None] * vector
-    series = np.einsum("sp,sp->s", scores / scale, vector) / np.sqrt(np.maximum(value, 1e-12 * value.max()))
+    values, vectors = np.linalg.eigh(parts / np.outer(scale, scale))
+    values = np.maximum(values, 1e-12 * values.max(axis=0))
     total = np.zeros_like(parts[0])
     for turn in strips.turns:
-        power = _power(series[turn])
-        waves = np.fft.fft(share[turn], axis=0)
-        total += np.real(np.einsum("m,mp,mq->pq", power, waves, waves.conj())) / len(power)
+        for value, direction in zip(values[turn].T, np.moveaxis(vectors[turn], 2, 0), strict=True):
+            # directions have no sign of their own: neighbours' are alike
+            turned = np.einsum("sp,sp->s", direction[1:], direction[:-1]) < 0.0
+            along = direction * np.cumprod(np.append(1.0, np.where(turned, -1.0, 1.0)))[:, None]
+            power = _power(np.einsum("sp,sp->s", scores[turn] / scale, along) / np.sqrt(value))
+            waves = np.fft.rfft(np.sqrt(value)[:, None] * along, axis=0) * np.sqrt(power)[:, None]
+            total += np.real(waves.T @ waves.conj()) / len(value)
     return np.asarray(total * np.outer(scale, scale))
 
 
 def _power(series: Array) -> Array:
-    """The power spectrum of a series around the outline, 1 for independent values of sigma 1, smooth in frequency."""
+    """The power spectrum of a series `[n]` around the outline at `[n // 2 + 1]` harmonics, smooth in frequency.
+
+    1 for independent values of sigma 1; both signs of a frequency count. White noise and a part that falls above some
+    frequency, as what an albedo does to edges does: the mean over such spectra, each by its likelihood (Whittle's).
+    """
     count = len(series)
-    harmonic = np.minimum(np.arange(count), count - np.arange(count))
-    raw = np.square(np.abs(np.fft.fft(series))) / count
-    free = harmonic >= _FITTED
-    if np.count_nonzero(free) < 8:
-        return np.ones(count)
-    # white noise and a part that falls above a frequency, as what an albedo does to edges does (Whittle's likelihood)
-    best, found = math.inf, np.ones(count)
-    for knee in _KNEES:
-        columns = np.stack([np.ones(count), 1.0 / (1.0 + np.square(harmonic / knee))], axis=1)
-        amounts = 0.5 * np.mean(raw[free]) / np.mean(columns[free], axis=0)
-        for _ in range(20):
-            model = columns @ amounts
-            weight = columns[free].T / np.square(model[free])
-            amounts = amounts * (weight @ raw[free]) / np.maximum(weight @ model[free], 1e-300)
-        model = np.maximum(columns @ amounts, 1e-9)
-        cost = float(np.sum(np.log(model[free]) + raw[free] / model[free]))
-        if cost < best:
-            best, found = cost, model
-    return found
+    harmonic = np.arange(count // 2 + 1)
+    twice = np.where((harmonic == 0) | (2 * harmonic == count), 1.0, 2.0)
+    raw = np.square(np.abs(np.fft.rfft(series))) / count + 1e-12
+    # a handful of frequencies tells as much as all of them
+    edges = np.unique(np.geomspace(_FITTED, len(raw), 24).astype(int))
+    if len(edges) < 5:
+        return twice
+    number = np.diff(edges)
+    observed = np.add.reduceat(raw[: edges[-1]], edges[:-1]) / number
+    middle = 0.5 * (edges[1:] + edges[:-1] - 1)
+    shape = 1.0 / (1.0 + np.square(middle / _KNEES[:, None]))
+    amounts = 0.5 * np.mean(observed) / np.stack([np.ones(len(shape)), shape.mean(axis=1)])
+    for _ in range(20):
+        model = amounts[0][:, None] + amounts[1][:, None] * shape
+        weight = number / np.square(model)
+        both = np.stack([np.ones_like(shape), shape])
+        amounts = amounts * (weight * observed * both).sum(axis=2) / (weight * model * both).sum(axis=2)
+    cost = np.sum(number * (np.log(model) + observed / model), axis=1)
+    share = np.exp(cost.min() - cost)
+    share /= share.sum()
+    smooth = share @ amounts[0] + (share * amounts[1]) @ (1.0 / (1.0 + np.square(harmonic / _KNEES[:, None])))
+    return np.asarray(twice * np.maximum(smooth, 1e-9))
