@@ -22,7 +22,7 @@ Image = NDArray[np.float32]
 
 #: the ambient light is collimated and the texture smooth, so the background needs few samples a pixel
 BACKGROUND_SAMPLES = 4
-#: what varies with the wavelength needs more: it leaves 1.2 % of noise in white light where 4 leave 9 %
+#: what varies with the wavelength needs more: it leaves 0.3 % of noise in white light where 4 leave 2.4 %
 SPECTRAL_BACKGROUND_SAMPLES = 16
 #: the background belongs to the scene and not to a run: every run sees the same one
 BACKGROUND_SEED = 0
