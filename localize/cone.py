@@ -14,7 +14,7 @@ from localize.noise import NoiseModel, linear_light, noise_of
 from localize.outcome import LocalizationFailure, Outcome
 from localize.prior import Estimate, Knowns
 from localize.profile import Profile
-from localize.start import Start, find_start
+from localize.start import Start, find_starts, first_believed
 from localize.verdict import COVERED, UNCERTAIN, judged
 from localize.view import outlines
 from scene.scene import Scene
@@ -37,17 +37,16 @@ def cone(
 ) -> Outcome:
     """The tip from a checked image `[H, W]` or `[H, W, 3]`; `reference` (no spotlight) helps the search only."""
     known, sensor = knowns or Knowns(), noise or noise_of(scene)
-    start = find_start(image, scene, reference)
-    if isinstance(start, str):
-        return LocalizationFailure(start)
-    fit = fit_edge(image, scene, start, known, sensor)
+    return first_believed(
+        find_starts(image, scene, reference), scene, lambda start: edge_outcome(image, scene, start, known, sensor)
+    )
+
+
+def edge_outcome(image: NDArray[np.generic], scene: Scene, start: Start, knowns: Knowns, noise: NoiseModel) -> Outcome:
+    """The localization from the edge fit near a start, or why it may not be believed."""
+    fit = fit_edge(image, scene, start, knowns, noise)
     if isinstance(fit, str):
         return LocalizationFailure(fit)
-    return edge_outcome(fit, scene, known)
-
-
-def edge_outcome(fit: BandFit, scene: Scene, knowns: Knowns) -> Outcome:
-    """The localization an edge fit stands for, or why it may not be believed."""
     return judged(
         fit.estimate, np.asarray(np.linalg.inv(fit.covariance)), 1.0, scene, knowns,
         misfit=fit.misfit, covered=fit.covered, settled=fit.settled,
@@ -89,7 +88,7 @@ def fit_edge(
             reach = max(_FULL_LEAST_BINS, _FULL_MM / scene.camera.pixel_pitch)
             stages.append((1, reach, _FULL_LEAST_BINS, 6) if sharp else (1, 14.0, 6.0, 6))
         else:
-            stages[-1] = (1, 5.0, 5.0, 8) if sharp else (1, 20.0, 5.0, 8)
+            stages[-1] = (1, _FULL_LEAST_BINS, _FULL_LEAST_BINS, 8) if sharp else (1, 20.0, 5.0, 8)
     estimate = Estimate.at(start.pose, scene)
     gains: tuple[float, ...] = ()
     fit: BandFit | None = None

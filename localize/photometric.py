@@ -10,12 +10,12 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from localize.cone import edge_outcome, fit_edge, is_clipped, is_sharp
+from localize.cone import edge_outcome, is_clipped, is_sharp
 from localize.field import Field, FieldFit, fit_field
 from localize.noise import NoiseModel, noise_of
 from localize.outcome import LocalizationFailure, Outcome
 from localize.prior import Estimate, Knowns
-from localize.start import Start, find_start
+from localize.start import Start, find_starts, first_believed
 from localize.verdict import COVERED, UNCERTAIN, judged
 from localize.view import outlines
 from scene.scene import Scene
@@ -40,21 +40,19 @@ def photometric(
     `reference` is the same view in ambient light alone, averaged over `frames` frames; in the image's own pixel values.
     """
     known, sensor = knowns or Knowns(), noise or noise_of(scene)
-    start = find_start(image, scene, reference)
-    if isinstance(start, str):
-        return LocalizationFailure(start)
-    if is_sharp(scene) or is_clipped(image, scene, start):
-        edge = fit_edge(image, scene, start, known, sensor)
-        if isinstance(edge, str):
-            return LocalizationFailure(edge)
-        return edge_outcome(edge, scene, known)
-    fit = fit_patch(image, scene, start, known, sensor, reference, frames)
-    if isinstance(fit, str):
-        return LocalizationFailure(fit)
-    return judged(
-        fit.estimate, fit.information, fit.correlation, scene, known,
-        misfit=fit.misfit, covered=fit.lit_share, settled=fit.settled,
-    )  # fmt: skip
+
+    def localized(start: Start) -> Outcome:
+        if is_sharp(scene) or is_clipped(image, scene, start):
+            return edge_outcome(image, scene, start, known, sensor)
+        fit = fit_patch(image, scene, start, known, sensor, reference, frames)
+        if isinstance(fit, str):
+            return LocalizationFailure(fit)
+        return judged(
+            fit.estimate, fit.information, fit.correlation, scene, known,
+            misfit=fit.misfit, covered=fit.lit_share, settled=fit.settled,
+        )  # fmt: skip
+
+    return first_believed(find_starts(image, scene, reference), scene, localized)
 
 
 def fit_patch(

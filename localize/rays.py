@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 
@@ -23,6 +24,7 @@ _ALONG = np.arange(0.5, 1.43, 0.04)
 _INSIDE, _OUTSIDE = _ALONG < 0.7, _ALONG > 1.15
 _NEEDED = len(_ALONG) - 4  # samples of a ray that must be in the frame
 SHIFTS = 0.03 * np.arange(-8, 9)  #: of the outline that are tried
+_FRACTIONS = np.linspace(0.0, 2.5, 501)  # of the half angle
 _WHITE = 0.97
 #: of a clipped patch only the rim is seen, and its contrast is what explains the rim best
 _CLIPPED_CONTRASTS = (1.0, 4.0, 16.0, 64.0)
@@ -50,6 +52,15 @@ class Rays:
         return self.middle + (1.0 + shift)[:, None] * (self.ends - self.middle), worth
 
 
+def support(seen: Sequence[Rays]) -> float:
+    """Mean share of the gradients that the outlines as they are explain, 0 to 1; a ray that sees another counts 0."""
+    middle = len(SHIFTS) // 2
+    total = np.concatenate([rays.total for rays in seen])
+    left = np.concatenate([rays.left for rays in seen])
+    here = np.abs(np.argmin(left, axis=1) - middle) <= 1
+    return float(np.mean(here * np.clip(1.0 - left[:, middle] / np.maximum(total, 1e-6), 0.0, 1.0)))
+
+
 def rays_across(overview: Overview, scene: Scene, pose: Pose) -> list[Rays]:
     """The rays across the outlines of the spotlights of which enough is in the frame."""
     curves = (scene.camera.project(scene.outline(pose, k, _RAYS)) for k in range(len(scene.spotlights)))
@@ -73,16 +84,16 @@ def _across(overview: Overview, beam: Beam, curve: Array, spotlight: int) -> Ray
     ground = None if overview.reference is None else _sampled(overview.reference, at, blur)
     log = overview.logarithm(light, ground).astype(float)
     inside, outside = (float(np.median(log[:, part])) for part in (_INSIDE, _OUTSIDE))
-    fraction, profile = _profile(beam, round(math.hypot(blur, 0.4) / size, 2))
-    contrast = math.expm1(max(0.05, inside - outside)) / max(0.02, float(np.interp(0.6, fraction, profile)))
+    profile, kernel = _profile(beam), _kernel(round(math.hypot(blur, 0.4) / size, 2))
+    contrast = math.expm1(max(0.05, inside - outside)) / max(0.02, float(np.interp(0.6, _FRACTIONS, profile)))
     clipped = float(np.mean(light[:, _INSIDE] > _WHITE)) > 0.3
-    ceiling = math.log(1.0 + overview.floor) - outside if clipped else math.inf
-    shape = np.interp(_ALONG / (1.0 + SHIFTS[:, None]), fraction, profile)
+    ceiling = (1.0 + overview.floor) / math.exp(outside) if clipped else math.inf
     kept = valid[:, 1:].astype(float)
     steps = np.diff(log, axis=1) * kept
     tried = []
     for factor in _CLIPPED_CONTRASTS if clipped else (1.0,):
-        model = np.diff(np.minimum(np.log1p(factor * contrast * shape), ceiling), axis=1)
+        bright = np.convolve(np.minimum(1.0 + factor * contrast * profile, ceiling), kernel, "same")
+        model = np.diff(np.interp(_ALONG / (1.0 + SHIFTS[:, None]), _FRACTIONS, np.log(bright)), axis=1)
         tried.append(np.abs(steps[:, None, :] - model * kept[:, None, :]).sum(axis=2))
     left = min(tried, key=lambda sums: float(sums.min(axis=1).sum()))
     return Rays(spotlight, (middle + 0.5) * overview.step, curve[use], left, np.abs(steps).sum(axis=1))
@@ -98,15 +109,18 @@ def _sampled(plane: Plane, at: Array, blur: float) -> Plane:
     return np.asarray(cv2.remap(crop, x, y, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE), np.float32)
 
 
-@lru_cache(maxsize=64)
-def _profile(beam: Beam, blur: float) -> tuple[Array, Array]:
-    """The beam's profile, blurred, over fractions of its half angle."""
+@lru_cache(maxsize=8)
+def _profile(beam: Beam) -> Array:
+    """The beam's profile at `_FRACTIONS` of its half angle."""
     profile = Profile.of(beam)
-    fraction = np.linspace(0.0, 2.0, 401)
-    angle = fraction * profile.half_angle
-    value = profile.value(np.cos(angle) if profile.cosine else -angle)
-    width = max(0.1, blur / (fraction[1] - fraction[0]))
+    angle = _FRACTIONS * profile.half_angle
+    return profile.value(np.cos(angle) if profile.cosine else -angle)
+
+
+@lru_cache(maxsize=64)
+def _kernel(blur: float) -> Array:
+    """A Gaussian of `blur` over `_FRACTIONS`, of sum 1."""
+    width = max(0.1, blur / (_FRACTIONS[1] - _FRACTIONS[0]))
     reach = int(3.0 * width) + 1
     kernel = np.exp(-0.5 * np.square(np.arange(-reach, reach + 1) / width))
-    mirrored = np.concatenate([value[reach:0:-1], value, np.zeros(reach)])
-    return fraction, np.convolve(mirrored, kernel / kernel.sum(), "valid")
+    return np.asarray(kernel / kernel.sum())

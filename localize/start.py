@@ -16,10 +16,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from localize.forward import look, moved, tangents
-from localize.outcome import LocalizationFailure, Outcome
+from localize.outcome import Localization, LocalizationFailure, Outcome
 from localize.outline import distances
 from localize.prior import Estimate
-from localize.rays import SHIFTS, Rays, rays_across
+from localize.rays import rays_across, support
 from localize.rings import Overview, Ring, find_rings
 from scene.pose import Pose
 from scene.scene import Scene
@@ -27,6 +27,8 @@ from scene.spotlights import spotlight_axes
 
 Array = NDArray[np.float64]
 NOTHING = "no spotlight stands out from its surroundings"
+ELSEWHERE = "the light is not where the fit puts the patch"
+_NEAR = 0.1  # of a patch's radius; starts are good to a third of it
 _RINGS = 6
 _TURNS = 4  # steps from a ring's pose to that of the outline the rays see
 _FEWEST_RAYS = 8
@@ -34,6 +36,7 @@ _LEAST_WORTH = 0.2  # share of a ray's gradients that says where the outline is
 #: share of the gradients that a patch explains where nothing else is bright; a disc explains a fifth
 CONVINCING = 0.5
 _LEAST = 0.1
+_COMPARABLE = 0.7  # share of what the best pose explains with which another is tried after it
 _RIVAL = 0.85  # share of the best ring's votes with which another may be the patch
 _APART_MM = 0.1  # between poses that count as two
 _ROLLS = 36
@@ -45,13 +48,18 @@ class Start:
     """A first pose through the RCM."""
 
     pose: Pose
-    explained: float  #: share of the log light's gradients across the outlines that the cones explain, at most 1
-    overview: Overview
+    explained: float  #: share of the log light's gradients across the outlines that the cones explain, 0 to 1
 
-    def explains(self, pose: Pose, scene: Scene) -> float:
-        """The share that another `pose` explains of the same image; 0 if it has no outline in the frame."""
-        seen = rays_across(self.overview, scene, pose)
-        return _share(seen) if seen else 0.0
+    def near(self, pose: Pose, scene: Scene) -> bool:
+        """Whether the outlines of `pose` are where the start found them, as well as a start can tell."""
+        for k in range(len(scene.spotlights)):
+            mine, other = (scene.camera.project(scene.outline(p, k, 24)) for p in (self.pose, pose))
+            size = float(np.mean(np.linalg.norm(mine - mine.mean(axis=0), axis=1)))
+            shift = np.linalg.norm(mine.mean(axis=0) - other.mean(axis=0))
+            growth = float(np.mean(np.linalg.norm(other - other.mean(axis=0), axis=1))) - size
+            if not shift + abs(growth) < _NEAR * size:
+                return False
+        return True
 
 
 def find_start(image: NDArray[np.generic], scene: Scene, reference: NDArray[np.generic] | None = None) -> Start | str:
@@ -74,18 +82,21 @@ def find_starts(
             found = _settled(overview, scene, find_rings(overview, scene, _RINGS, curves), found)
         found = _settled(overview, scene, find_rings(overview, scene, _RINGS, [rings[0].curve()]), found)
     best = found[0].explained if found else 0.0
-    yield from (start for start in found[:3] if start.explained > max(_LEAST, 0.3 * best))
+    yield from (start for start in found[:3] if start.explained > max(_LEAST, _COMPARABLE * best))
 
 
-def first_believed(starts: Iterable[Start], localized: Callable[[Start], Outcome]) -> Outcome:
+def first_believed(starts: Iterable[Start], scene: Scene, localized: Callable[[Start], Outcome]) -> Outcome:
     """The outcome of the first start that does not end in a refusal, or the first refusal."""
-    refusal: Outcome = LocalizationFailure(NOTHING)
-    for number, start in enumerate(starts):
+    refusal: LocalizationFailure | None = None
+    for start in starts:
         outcome = localized(start)
-        if outcome:
-            return outcome
-        refusal = refusal if number else outcome
-    return refusal
+        if isinstance(outcome, Localization):
+            pose = Pose(outcome.apex_mm, outcome.axis, outcome.roll or 0.0)
+            if start.near(pose, scene):
+                return outcome
+            outcome = LocalizationFailure(ELSEWHERE)
+        refusal = outcome if refusal is None else refusal
+    return LocalizationFailure(NOTHING) if refusal is None else refusal
 
 
 def _rivals(ring: Ring, best: Ring) -> bool:
@@ -109,11 +120,6 @@ def _differ(a: Pose, b: Pose) -> bool:
     return float(np.linalg.norm(a.apex - b.apex)) > _APART_MM or turned > 0.2
 
 
-def _share(seen: list[Rays]) -> float:
-    left = sum(float(rays.left[:, len(SHIFTS) // 2].sum()) for rays in seen)
-    return 1.0 - left / max(1e-9, sum(float(rays.total.sum()) for rays in seen))
-
-
 def _settle(overview: Overview, scene: Scene, pose: Pose) -> Start | None:
     """The pose near `pose` whose outlines the rays see; None where there is none."""
     estimate: Estimate | None = Estimate.at(pose, scene)
@@ -124,7 +130,7 @@ def _settle(overview: Overview, scene: Scene, pose: Pose) -> Start | None:
         if not seen:
             return None
         if turn == _TURNS:
-            return Start(estimate.pose, _share(seen), overview)
+            return Start(estimate.pose, support(seen))
         points, worth = zip(*(rays.found() for rays in seen), strict=True)
         spots = np.concatenate([np.full(len(r.total), r.spotlight, np.intp) for r in seen])
         sizes = np.concatenate([np.linalg.norm(r.ends - r.middle, axis=1) for r in seen])
@@ -200,7 +206,7 @@ def _turned(a: Pose, b: Pose) -> float:
     return abs(math.remainder(a.roll - b.roll, 2.0 * math.pi))
 
 
-def _on(ring: Ring, rolls: Array, spotlight: int, scene: Scene) -> list[Pose]:
+def _on(ring: Ring, rolls: NDArray[np.floating], spotlight: int, scene: Scene) -> list[Pose]:
     """Poses through the RCM with each of `rolls` whose cone `spotlight` meets the wall in the ring."""
     edge = look(scene, ring.curve()).points
     rcm = np.asarray(scene.instrument.rcm)
