@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from localize.forward import Sight
+from localize.forward import look
 from scene.pose import Pose
 from scene.scene import Scene
 from scene.spotlights import Shaft
@@ -13,16 +13,17 @@ from scene.spotlights import Shaft
 Array = NDArray[np.float64]
 
 
-def covered(sight: Sight, pose: Pose, scene: Scene, *, slack: float = 0.05) -> NDArray[np.bool_]:
-    """Which of the pixels `[N]` with this `sight` the shaft covers or shades when the instrument is at `pose`.
+def covered(pixels: Array, pose: Pose, scene: Scene, *, side: float = 1.0, slack: float = 0.05) -> NDArray[np.bool_]:
+    """Which pixels with centres `[N, 2]` [px] and `side` [px] the shaft covers or shades: `[N]`.
 
-    A pixel counts as soon as any of it may be touched, for a shaft thicker and longer by `slack` [mm], which is what
-    the pose may still be wrong by. No pixel without a shaft, or where a pixel sees no retina. The spotlights stand in
-    front of the shaft, which therefore takes none of their light.
+    The instrument is at `pose`. A pixel counts as soon as any of it may be touched, for a shaft thicker and longer by
+    `slack` [mm], which is what the pose may still be wrong by. No pixel without a shaft, or where a pixel sees no
+    retina. The spotlights stand in front of the shaft, which therefore takes none of their light.
     """
     shaft = scene.instrument.shaft
     if shaft is None:
-        return np.zeros(len(sight.points), bool)
+        return np.zeros(len(pixels), bool)
+    sight = look(scene, pixels, side)
     # half the pixel's diagonal on the retina; up at the shaft it is smaller
     pixel = (np.linalg.norm(sight.along_x, axis=1) + np.linalg.norm(sight.along_y, axis=1)) / 2.0
     margin = np.where(np.isfinite(pixel), pixel, 0.0) + slack

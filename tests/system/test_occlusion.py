@@ -7,7 +7,7 @@ import math
 import numpy as np
 import pytest
 
-from localize.forward import look, moved, window
+from localize.forward import moved, window
 from localize.occlusion import covered
 from render import Renderer
 from scene import Camera, Scene
@@ -35,12 +35,12 @@ def test_every_pixel_the_shaft_or_its_shadow_changes_is_covered_and_hardly_anoth
     pose = scene.pose(np.array(TIPS[tip]))
     renderer = Renderer(scene, samples=32)
     change = np.abs(renderer.background(pose) / renderer.background() - 1.0)[..., 0]
-    sight = look(scene, window(0, 0, SIDE, SIDE))
-    mask = covered(sight, pose, scene, slack=0.0).reshape(SIDE, SIDE)
+    pixels = window(0, 0, SIDE, SIDE)
+    mask = covered(pixels, pose, scene, slack=0.0).reshape(SIDE, SIDE)
     assert (change > 0.5).sum() > 500
     assert not np.any((change > 0.01) & ~mask)
     # all of it black but for a rim of 1.3 pixels
-    inside = covered(sight, pose, scene, slack=-0.1).reshape(SIDE, SIDE)
+    inside = covered(pixels, pose, scene, slack=-0.1).reshape(SIDE, SIDE)
     assert change[inside].min() > 0.9
     assert inside.sum() > 0.5 * mask.sum()
 
@@ -48,14 +48,23 @@ def test_every_pixel_the_shaft_or_its_shadow_changes_is_covered_and_hardly_anoth
 def test_slack_covers_a_shaft_that_is_a_little_elsewhere():
     scene = scene_of(20.0, 100.0, surface=Surface(semi_axes=(1.0, 1.0, 1.1)))
     pose = scene.pose(np.array([1.0, 0.5, 3.0]))
-    sight = look(scene, window(0, 0, SIDE, SIDE))
-    true = covered(sight, pose, scene, slack=0.0)
+    pixels = window(0, 0, SIDE, SIDE)
+    true = covered(pixels, pose, scene, slack=0.0)
     for step in np.vstack([0.04 * np.eye(3), -0.04 * np.eye(3)]):
         there = moved(pose, np.array([*step, 0.0, 0.0]))
-        assert not np.any(true & ~covered(sight, there, scene, slack=0.05))
-    assert true.sum() < covered(sight, pose, scene).sum() < 1.5 * true.sum()
+        assert not np.any(true & ~covered(pixels, there, scene, slack=0.05))
+    assert true.sum() < covered(pixels, pose, scene).sum() < 1.5 * true.sum()
 
 
 def test_without_a_shaft_nothing_is_covered():
     scene = Scene(camera=Camera(resolution=50))
-    assert not covered(look(scene, window(0, 0, 50, 50)), scene.pose(np.array([0.0, 0.0, 4.0])), scene).any()
+    assert not covered(window(0, 0, 50, 50), scene.pose(np.array([0.0, 0.0, 4.0])), scene).any()
+
+
+def test_a_bin_counts_as_soon_as_any_of_its_pixels_does():
+    scene = scene_of(20.0, 100.0)
+    pose = scene.pose(np.array([1.0, 0.5, 3.0]))
+    fine = covered(window(0, 0, SIDE, SIDE), pose, scene, slack=0.0).reshape(SIDE // 3, 3, SIDE // 3, 3)
+    coarse = covered(window(0, 0, SIDE // 3, SIDE // 3, 3), pose, scene, side=3.0, slack=0.0)
+    assert not np.any(fine.mean(axis=(1, 3)).ravel()[~coarse])
+    assert fine.mean() < coarse.mean() < 2.0 * fine.mean()
