@@ -16,9 +16,13 @@ from scipy.linalg.lapack import dtrtri
 
 Array = NDArray[np.float64]
 _EXPONENT, _KNEE = 2.6, 8.0
-#: amplitudes of the power spectrum between a uniform and a very coarse fundus
-_AMPLITUDE_RANGE = (1e-10, 0.02)
-FUNDUS_AMPLITUDE = 0.0025
+#: amplitudes of the power spectrum between a uniform fundus and an optic disc
+_AMPLITUDE_RANGE = (1e-10, 1.0)
+#: octaves of the wave number, the first up to 1/4 mm, the last from 16 per mm
+_FIRST_OCTAVE, _OCTAVES = -2, 8
+_SHARED = 4.0  # what the next finer octave says of an octave's amplitude, in modes
+#: amplitudes to start from, of a fundus and of what a reference leaves of it
+FUNDUS, KNOWN = np.full(_OCTAVES, 0.0025), np.full(_OCTAVES, 1e-5)
 _MEAN_VARIANCE = 100.0  # of the mean, which nothing restricts
 
 
@@ -31,6 +35,7 @@ class Modes:
     twice_y: Array  #: cosines of twice as many orders, not normalized `[2 ny, h]`
     twice_x: Array  #: `[2 nx, w]`
     spectrum: Array  #: prior variances for amplitude 1 `[ny nx]`
+    octave: NDArray[np.intp]  #: of each mode's wave number `[ny nx]`
 
     @classmethod
     def over(cls, height: int, width: int, bin_mm: float, count: int) -> Modes:
@@ -42,11 +47,13 @@ class Modes:
         k[0] = 1.0
         spectrum = k**-_EXPONENT / (1.0 + (k / _KNEE) ** 2) / (sides[0] * sides[1])
         norm_y, norm_x = _norms(ny), _norms(nx)
-        return cls(norm_y[:, None] * twice[0][:ny], norm_x[:, None] * twice[1][:nx], twice[0], twice[1], spectrum)
+        octave = np.clip(np.floor(np.log2(k)).astype(np.intp) - _FIRST_OCTAVE, 0, _OCTAVES - 1)
+        along_y, along_x = norm_y[:, None] * twice[0][:ny], norm_x[:, None] * twice[1][:nx]
+        return cls(along_y, along_x, twice[0], twice[1], spectrum, octave)
 
-    def precision(self, amplitude: float) -> Array:
+    def precision(self, amplitudes: Array) -> Array:
         """Prior precision of each mode `[ny nx]`."""
-        variance = amplitude * self.spectrum
+        variance = amplitudes[self.octave] * self.spectrum
         variance[0] = _MEAN_VARIANCE
         return 1.0 / variance
 
@@ -73,16 +80,22 @@ class Modes:
         both *= 0.25 * np.multiply.outer(np.outer(norm_y, norm_y), np.outer(norm_x, norm_x))
         return np.asarray(both.transpose(0, 2, 1, 3).reshape(ny * nx, ny * nx))
 
-    def learnt_amplitude(self, coefficients: Array, variances: Array, amplitude: float) -> float:
-        """The amplitude that MacKay's fixed point makes of the modes' posterior means and variances.
+    def learnt(self, coefficients: Array, variances: Array, amplitudes: Array) -> Array:
+        """The octaves' amplitudes that MacKay's fixed point makes of the modes' posterior means and variances.
 
-        D. J. C. MacKay, Bayesian interpolation, Neural Computation 4 (1992).
+        D. J. C. MacKay, Bayesian interpolation, Neural Computation 4 (1992). The coarsest octaves have few modes, which
+        the pose imitates: each octave is taken to be like the next finer one unless its modes say otherwise.
         """
-        if len(coefficients) < 2:
-            return amplitude
-        determined = np.sum(1.0 - variances[1:] / (amplitude * self.spectrum[1:]))
-        power = np.sum(np.square(coefficients[1:]) / self.spectrum[1:])
-        return float(np.clip(power / max(float(determined), 1.0), *_AMPLITUDE_RANGE))
+        index, spectrum = self.octave[1:], self.spectrum[1:]
+        known = 1.0 - variances[1:] / (amplitudes[index] * spectrum)
+        determined = np.bincount(index, weights=np.maximum(known, 0.0), minlength=_OCTAVES)
+        power = np.bincount(index, weights=np.square(coefficients[1:]) / spectrum, minlength=_OCTAVES)
+        found = amplitudes.copy()
+        finer = float(np.sum(power) / max(float(np.sum(determined)), 1.0))
+        for octave in reversed(range(_OCTAVES)):
+            finer = float((power[octave] + _SHARED * finer) / (determined[octave] + _SHARED))
+            found[octave] = finer
+        return np.clip(found, *_AMPLITUDE_RANGE)
 
 
 @dataclass(frozen=True)
@@ -100,10 +113,10 @@ class Eliminated:
         return np.asarray(self.offset - self.gain @ step)
 
 
-def eliminate(modes: Modes, weights: Array, jacobian: Array, data: Array, amplitude: float) -> Eliminated:
+def eliminate(modes: Modes, weights: Array, jacobian: Array, data: Array, amplitudes: Array) -> Eliminated:
     """Normal equations for `data` `[h, w]` = `jacobian` `[P, h, w]` step + modes + noise of precision `weights`."""
     system = modes.gram(weights)
-    system[np.diag_indices_from(system)] += modes.precision(amplitude)
+    system[np.diag_indices_from(system)] += modes.precision(amplitudes)
     count = len(jacobian)
     weighted = jacobian * weights
     flat, y = weighted.reshape(count, -1), data.ravel()

@@ -17,7 +17,7 @@ from localize.outcome import LocalizationFailure, Outcome
 from localize.prior import Estimate, Knowns
 from localize.start import Start, find_starts, first_believed
 from localize.verdict import COVERED, UNCERTAIN, judged
-from localize.view import outlines
+from localize.view import outline
 from scene.scene import Scene
 
 #: bins across the patch, modes a side, iterations, of which tied to the RCM
@@ -48,7 +48,7 @@ def photometric(
         if isinstance(fit, str):
             return LocalizationFailure(fit)
         return judged(
-            fit.estimate, fit.information, fit.correlation, scene, known,
+            fit.estimate, fit.information, 1.0, scene, known,
             misfit=fit.misfit, covered=fit.lit_share, settled=fit.settled,
         )  # fmt: skip
 
@@ -67,7 +67,7 @@ def fit_patch(
     """The field fit, coarse to fine, or why there is none."""
     estimate, fields = Estimate.at(start.pose, scene), tuple[Field, ...]()
     fit: FieldFit | None = None
-    points = outlines(estimate)
+    points = outline(estimate, 0)
     binned = len(points) > 0 and float(np.max(np.ptp(points, axis=0))) >= 2.0 * _LEVELS[-1][0]
     for number, (bins, plain, iterations, tied) in enumerate(_LEVELS):
         modes = _BINNED_MODES if binned and number + 1 == len(_LEVELS) else plain

@@ -10,8 +10,10 @@ from numpy.typing import NDArray
 
 from localize.forward import Sight, ambient_irradiance, light, light_by_surface, look, window
 from localize.noise import NoiseModel, linear_light
+from localize.occlusion import covered
 from localize.prior import Estimate, Knowns, value, with_value
 from scene.scene import Scene
+from scene.spotlights import spotlight_axes
 
 Array = NDArray[np.float64]
 _STEP = 1e-3  # of eye radius and camera height [mm], for differences
@@ -28,18 +30,17 @@ class Window:
     side: int
 
     @classmethod
-    def around(cls, estimate: Estimate, bins: int, margin: float) -> Window | None:
-        """The visible outlines with `margin` times their size around, `bins` bins across; None if out of the frame."""
-        scene = estimate.scene
-        points = outlines(estimate)
+    def around(cls, estimate: Estimate, spotlight: int, bins: int, margin: float) -> Window | None:
+        """A spotlight's outline with `margin` times its size around, `bins` bins across; None if out of the frame."""
+        points, scene = outline(estimate, spotlight), estimate.scene
         if not len(points):
             return None
         low, high = points.min(axis=0), points.max(axis=0)
         size = float(np.max(high - low))
         side = max(1, int(size / bins))
         edge = scene.camera.resolution // side
-        low = np.maximum(np.floor((low - margin * size) / side), 0).astype(int)
-        high = np.minimum(np.ceil((high + margin * size) / side), edge).astype(int)
+        low = np.clip(np.floor((low - margin * size) / side), 0, edge).astype(int)
+        high = np.clip(np.ceil((high + margin * size) / side), 0, edge).astype(int)
         if np.any(high - low < 6):
             return None
         return cls(int(low[1]) * side, int(low[0]) * side, int(high[1] - low[1]), int(high[0] - low[0]), side)
@@ -55,15 +56,26 @@ class Window:
         return cv2.resize(pixels, (self.width, self.height), interpolation=cv2.INTER_AREA).astype(float)
 
 
+def outline(estimate: Estimate, spotlight: int, points: int = 96) -> Array:
+    """Pixels `[N, 2]` [px] of a spotlight's outline, in the frame or beyond."""
+    pixels = estimate.scene.camera.project(estimate.scene.outline(estimate.pose, spotlight, points))
+    return np.asarray(pixels[np.all(np.isfinite(pixels), axis=1)])
+
+
+def _inside(pixels: Array, scene: Scene) -> NDArray[np.bool_]:
+    return np.asarray(np.all((pixels > 0.0) & (pixels < scene.camera.resolution), axis=1))
+
+
 def outlines(estimate: Estimate, points: int = 96) -> Array:
     """Pixels `[N, 2]` [px] of all spotlights' outlines that are in the frame."""
-    scene = estimate.scene
-    found = []
-    for k in range(len(scene.spotlights)):
-        found.append(scene.camera.project(scene.outline(estimate.pose, k, points)))
-    pixels = np.concatenate(found)
-    inside = np.all((pixels > 0.0) & (pixels < scene.camera.resolution), axis=1)
-    return pixels[inside]
+    pixels = np.concatenate([outline(estimate, k, points) for k in range(len(estimate.scene.spotlights))])
+    return np.asarray(pixels[_inside(pixels, estimate.scene)])
+
+
+def visible(estimate: Estimate) -> float:
+    """Share of the spotlights' outlines that is in the frame."""
+    count = len(estimate.scene.spotlights)
+    return len(outlines(estimate)) / (96 * count)
 
 
 @dataclass(frozen=True)
@@ -125,16 +137,19 @@ def _log_albedo(plane: Array, irradiance: Array, noise: NoiseModel, samples: flo
 class Grid:
     """A window's bins as the model sees them: light is computed only where the cones may reach."""
 
-    def __init__(self, at: Window, estimate: Estimate, knowns: Knowns, *, reach: int = 4) -> None:
-        """`reach` [bins] is how far the outline may still move."""
+    def __init__(self, at: Window, estimate: Estimate, knowns: Knowns, spotlight: int, *, reach: int = 4) -> None:
+        """`reach` [bins] is how far the outlines may still move; the window is that of one `spotlight`.
+
+        Bins nearer to another spotlight's axis are not seen: they count in that one's window. Nor are those where the
+        shaft may be.
+        """
         self.at, self.knowns = at, knowns
         scene = estimate.scene
         pixels = window(at.row, at.column, at.height, at.width, at.side)
         self._pixels = pixels
         mask = np.zeros((at.height, at.width), np.uint8)
         for k in range(len(scene.spotlights)):
-            points = scene.camera.project(scene.outline(estimate.pose, k, 64))
-            points = points[np.all(np.isfinite(points), axis=1)]
+            points = outline(estimate, k)
             if len(points) > 2:
                 bins = (points - [at.column, at.row]) / at.side - 0.5
                 cv2.fillPoly(mask, [np.round(bins).astype(np.int32)], 1)
@@ -144,6 +159,11 @@ class Grid:
         ambient = ambient_irradiance(sight, scene)
         self.seen = np.isfinite(ambient)
         self.ambient = np.where(self.seen, ambient, 1.0)
+        self.seen &= ~covered(pixels, estimate.pose, scene, side=at.side)
+        if len(scene.spotlights) > 1:
+            to = sight.points - estimate.pose.apex
+            cosines = to @ spotlight_axes(estimate.pose, scene.spotlights).T
+            self.seen &= np.argmax(cosines, axis=1) == spotlight
         self._sight = Sight(*(field[self.lit] for field in vars(sight).values()))
 
     def spotlight(self, estimate: Estimate, *, roll: bool) -> tuple[Array, Array]:
