@@ -14,7 +14,7 @@ from localize.noise import NoiseModel, linear_light, noise_of
 from localize.outcome import LocalizationFailure, Outcome
 from localize.prior import Estimate, Knowns
 from localize.profile import Profile
-from localize.start import Start, find_starts, first_believed
+from localize.start import Start, believed, find_starts
 from localize.verdict import COVERED, UNCERTAIN, judged
 from localize.view import outlines
 from scene.scene import Scene
@@ -37,7 +37,7 @@ def cone(
 ) -> Outcome:
     """The tip from a checked image `[H, W]` or `[H, W, 3]`; `reference` (no spotlight) helps the search only."""
     known, sensor = knowns or Knowns(), noise or noise_of(scene)
-    return first_believed(
+    return believed(
         find_starts(image, scene, reference), scene, lambda start: edge_outcome(image, scene, start, known, sensor)
     )
 

@@ -15,7 +15,7 @@ from localize.field import Field, FieldFit, fit_field
 from localize.noise import NoiseModel, noise_of
 from localize.outcome import LocalizationFailure, Outcome
 from localize.prior import Estimate, Knowns
-from localize.start import Start, find_starts, first_believed
+from localize.start import Start, believed, find_starts
 from localize.verdict import COVERED, UNCERTAIN, judged
 from localize.view import outline
 from scene.scene import Scene
@@ -52,7 +52,7 @@ def photometric(
             misfit=fit.misfit, covered=fit.lit_share, settled=fit.settled,
         )  # fmt: skip
 
-    return first_believed(find_starts(image, scene, reference), scene, localized)
+    return believed(find_starts(image, scene, reference), scene, localized)
 
 
 def fit_patch(

@@ -26,8 +26,9 @@ _NEEDED = len(_ALONG) - 4  # samples of a ray that must be in the frame
 SHIFTS = 0.03 * np.arange(-8, 9)  #: of the outline that are tried
 _FRACTIONS = np.linspace(0.0, 2.5, 501)  # of the half angle
 _WHITE = 0.97
-#: of a clipped patch only the rim is seen, and its contrast is what explains the rim best
-_CLIPPED_CONTRASTS = (1.0, 4.0, 16.0, 64.0)
+#: contrasts that are tried, over the one measured: of a clipped patch only the rim is seen, and where other things
+#: are bright what lies inside and outside the outline says little
+_PLAIN, _CLIPPED, _WIDE = (1.0,), (1.0, 4.0, 16.0, 64.0), (0.06, 0.12, 0.25, 0.5, 1.0, 2.0)
 
 
 @dataclass(frozen=True)
@@ -61,14 +62,21 @@ def support(seen: Sequence[Rays]) -> float:
     return float(np.mean(here * np.clip(1.0 - left[:, middle] / np.maximum(total, 1e-6), 0.0, 1.0)))
 
 
-def rays_across(overview: Overview, scene: Scene, pose: Pose) -> list[Rays]:
-    """The rays across the outlines of the spotlights of which enough is in the frame."""
+def rays_across(overview: Overview, scene: Scene, pose: Pose, *, thorough: bool = False) -> list[Rays]:
+    """The rays across the outlines of the spotlights of which enough is in the frame.
+
+    `thorough` doubts the contrast between what lies inside and outside the outline.
+    """
     curves = (scene.camera.project(scene.outline(pose, k, _RAYS)) for k in range(len(scene.spotlights)))
-    found = [_across(overview, scene.beam, curve, k) for k, curve in enumerate(curves) if np.all(np.isfinite(curve))]
+    found = [
+        _across(overview, scene.beam, curve, k, thorough)
+        for k, curve in enumerate(curves)
+        if np.all(np.isfinite(curve))
+    ]
     return [rays for rays in found if rays is not None]
 
 
-def _across(overview: Overview, beam: Beam, curve: Array, spotlight: int) -> Rays | None:
+def _across(overview: Overview, beam: Beam, curve: Array, spotlight: int, thorough: bool) -> Rays | None:
     last = overview.light.shape[0] - 1.0
     bins = curve / overview.step - 0.5
     middle = bins.mean(axis=0)
@@ -91,7 +99,7 @@ def _across(overview: Overview, beam: Beam, curve: Array, spotlight: int) -> Ray
     kept = valid[:, 1:].astype(float)
     steps = np.diff(log, axis=1) * kept
     tried = []
-    for factor in _CLIPPED_CONTRASTS if clipped else (1.0,):
+    for factor in _CLIPPED if clipped else _WIDE if thorough else _PLAIN:
         bright = np.convolve(np.minimum(1.0 + factor * contrast * profile, ceiling), kernel, "same")
         model = np.diff(np.interp(_ALONG / (1.0 + SHIFTS[:, None]), _FRACTIONS, np.log(bright)), axis=1)
         tried.append(np.abs(steps[:, None, :] - model * kept[:, None, :]).sum(axis=2))

@@ -28,6 +28,7 @@ from scene.spotlights import spotlight_axes
 Array = NDArray[np.float64]
 NOTHING = "no spotlight stands out from its surroundings"
 ELSEWHERE = "the light is not where the fit puts the patch"
+TWO_PLACES = "two places in the frame look like the patch"
 _NEAR = 0.1  # of a patch's radius; starts are good to a third of it
 _RINGS = 6
 _TURNS = 4  # steps from a ring's pose to that of the outline the rays see
@@ -36,7 +37,7 @@ _LEAST_WORTH = 0.2  # share of a ray's gradients that says where the outline is
 #: share of the gradients that a patch explains where nothing else is bright; a disc explains a fifth
 CONVINCING = 0.5
 _LEAST = 0.1
-_COMPARABLE = 0.7  # share of what the best pose explains with which another is tried after it
+_COMPARABLE = 0.6  # share of what the best pose explains with which another is tried after it
 _RIVAL = 0.85  # share of the best ring's votes with which another may be the patch
 _APART_MM = 0.1  # between poses that count as two
 _ROLLS = 36
@@ -75,27 +76,31 @@ def find_starts(
     rings = find_rings(overview, scene, _RINGS)
     found = _settled(overview, scene, [ring for ring in rings if _rivals(ring, rings[0])], [])
     if not found or found[0].explained <= CONVINCING:
-        found = _settled(overview, scene, rings, found)
         # a patch that touches something brighter: what was found is taken out of the vote
-        for start in found[:1]:
-            curves = [scene.camera.project(scene.outline(start.pose, k, 96)) for k in range(len(scene.spotlights))]
-            found = _settled(overview, scene, find_rings(overview, scene, _RINGS, curves), found)
-        found = _settled(overview, scene, find_rings(overview, scene, _RINGS, [rings[0].curve()]), found)
+        hidden = [rings[0].curve(), *(_outlines(start.pose, scene) for start in found[:1])]
+        more = [ring for curve in hidden for ring in find_rings(overview, scene, _RINGS, [curve])]
+        found = _settled(overview, scene, [*rings, *more], found, thorough=True)
     best = found[0].explained if found else 0.0
     yield from (start for start in found[:3] if start.explained > max(_LEAST, _COMPARABLE * best))
 
 
-def first_believed(starts: Iterable[Start], scene: Scene, localized: Callable[[Start], Outcome]) -> Outcome:
-    """The outcome of the first start that does not end in a refusal, or the first refusal."""
+def believed(starts: Iterable[Start], scene: Scene, localized: Callable[[Start], Outcome]) -> Outcome:
+    """The one outcome of the starts that is not refused; if all are, the first refusal."""
     refusal: LocalizationFailure | None = None
+    found: Localization | None = None
     for start in starts:
         outcome = localized(start)
         if isinstance(outcome, Localization):
             pose = Pose(outcome.apex_mm, outcome.axis, outcome.roll or 0.0)
             if start.near(pose, scene):
-                return outcome
+                if found is not None and float(np.linalg.norm(found.apex_mm - outcome.apex_mm)) > _APART_MM:
+                    return LocalizationFailure(TWO_PLACES)
+                found = outcome if found is None else found
+                continue
             outcome = LocalizationFailure(ELSEWHERE)
         refusal = outcome if refusal is None else refusal
+    if found is not None:
+        return found
     return LocalizationFailure(NOTHING) if refusal is None else refusal
 
 
@@ -104,10 +109,17 @@ def _rivals(ring: Ring, best: Ring) -> bool:
     return ring is best or (ring.votes > _RIVAL * best.votes and apart > 0.7 * max(ring.radius, best.radius))
 
 
-def _settled(overview: Overview, scene: Scene, rings: Sequence[Ring], before: Sequence[Start]) -> list[Start]:
+def _outlines(pose: Pose, scene: Scene) -> Array:
+    return np.concatenate([scene.camera.project(scene.outline(pose, k, 96)) for k in range(len(scene.spotlights))])
+
+
+def _settled(
+    overview: Overview, scene: Scene, rings: Sequence[Ring], before: Sequence[Start], *, thorough: bool = False
+) -> list[Start]:
     """The poses that rings lead to, and those found before, without repetition, the best first."""
     poses = _single_poses(rings, scene) if len(scene.spotlights) == 1 else _rig_poses(rings, scene)
-    found = [*before, *(start for pose in poses if (start := _settle(overview, scene, pose)) is not None)]
+    settled = (_settle(overview, scene, pose, thorough=thorough) for pose in poses)
+    found = [*before, *(start for start in settled if start is not None)]
     distinct: list[Start] = []
     for start in sorted(found, key=lambda s: -s.explained):
         if all(_differ(start.pose, other.pose) for other in distinct):
@@ -120,13 +132,13 @@ def _differ(a: Pose, b: Pose) -> bool:
     return float(np.linalg.norm(a.apex - b.apex)) > _APART_MM or turned > 0.2
 
 
-def _settle(overview: Overview, scene: Scene, pose: Pose) -> Start | None:
+def _settle(overview: Overview, scene: Scene, pose: Pose, *, thorough: bool) -> Start | None:
     """The pose near `pose` whose outlines the rays see; None where there is none."""
     estimate: Estimate | None = Estimate.at(pose, scene)
     for turn in range(_TURNS + 1):
         if estimate is None:
             return None
-        seen = rays_across(overview, scene, estimate.pose)
+        seen = rays_across(overview, scene, estimate.pose, thorough=thorough)
         if not seen:
             return None
         if turn == _TURNS:
