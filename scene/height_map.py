@@ -17,6 +17,7 @@ from scene.quantity import Length
 Array = NDArray[np.float64]
 _MAX_BYTES = 20_000_000
 _FEWEST, _MOST = 4, 512  #: nodes a side
+_HIGHEST = 100.0  #: [mm], above any eye: what a spline can still be put through
 
 
 @dataclass(frozen=True, eq=False)
@@ -77,8 +78,8 @@ class ReliefMap(Model):
         sides = {len(row) for row in self.points} | {len(self.points)}
         if len({len(row) for row in self.points}) != 1 or min(sides) < _FEWEST or max(sides) > _MOST:
             raise ValueError(f"{self.file}: a height map needs {_FEWEST} to {_MOST} equally long rows and columns")
-        if not np.all(np.isfinite(self.points)):
-            raise ValueError(f"{self.file}: heights must be finite numbers")
+        if not float(np.max(np.abs(self.points))) * self.unit < _HIGHEST:
+            raise ValueError(f"{self.file}: heights must be finite and below {_HIGHEST:g} mm")
         return self
 
     @property

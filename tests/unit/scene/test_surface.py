@@ -191,6 +191,7 @@ def test_what_the_map_holds_counts_not_what_its_file_is_called(tmp_path):
         ("0," * 600 + "0\n", r"map.csv:1: a height map has at most 512"),
         ("0,0,0,0\n" * 600, r"map.csv:513: a height map has at most 512"),
         ("0,9000,9000,0\n" * 4, r"rises or sinks by up to 12 mm, over half the eye's radius"),
+        ("0,1e308,-1e308,0\n" * 4, r"map.csv: heights must be finite and below 100 mm"),
         (None, r"map.csv: cannot be read as CSV"),
     ],
 )
