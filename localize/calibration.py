@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from localize.band import BandFit
-from localize.cone import fit_edge
+from localize.edge import fit_edge
 from localize.forward import tangents
 from localize.noise import NoiseModel, noise_of
 from localize.prior import FREE, Knowns, value

@@ -142,9 +142,8 @@ def light(
         gx = np.einsum("ij,ij->i", across, sight.along_x)
         gy = np.einsum("ij,ij->i", across, sight.along_y)
         px, py = np.abs(gx) * stretch / 2.0, np.abs(gy) * stretch / 2.0
-        # a profile without a step has next to no light where this would matter
-        step = profile.coefficients[0, 0] > 0.0
-        edge = np.flatnonzero(np.abs(w - profile.knots[0]) < 1.5 * (px + py)) if step else np.zeros(0, np.intp)
+        # at the foot of a soft edge too: it is all that a clipped patch shows
+        edge = np.flatnonzero(np.abs(w - profile.knots[0]) < 1.5 * (px + py))
         if len(edge):
             missing = (profile.knots[0] - w) / stretch
             bend = _bend(sight, edge, (gx[edge], gy[edge]), to, d, c, across, missing, scene.eye.radius)

@@ -10,8 +10,9 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from localize.cone import edge_outcome, is_clipped, is_sharp
-from localize.field import Field, FieldFit, fit_field
+from localize.cone import edge_outcome
+from localize.edge import is_clipped, is_sharp
+from localize.field import FieldFit, fit_field
 from localize.noise import NoiseModel, noise_of
 from localize.outcome import LocalizationFailure, Outcome
 from localize.prior import Estimate, Knowns
@@ -65,18 +66,18 @@ def fit_patch(
     frames: float,
 ) -> FieldFit | str:
     """The field fit, coarse to fine, or why there is none."""
-    estimate, fields = Estimate.at(start.pose, scene), tuple[Field, ...]()
+    estimate = Estimate.at(start.pose, scene)
     fit: FieldFit | None = None
     points = outline(estimate, 0)
     binned = len(points) > 0 and float(np.max(np.ptp(points, axis=0))) >= 2.0 * _LEVELS[-1][0]
     for number, (bins, plain, iterations, tied) in enumerate(_LEVELS):
         modes = _BINNED_MODES if binned and number + 1 == len(_LEVELS) else plain
         fit = fit_field(
-            image, estimate, fields, knowns, noise,
+            image, estimate, fit, knowns, noise,
             bins=bins, modes=modes, iterations=iterations, tied=tied, reference=reference, frames=frames,
         )  # fmt: skip
         if fit is None:
             return UNCERTAIN if number else COVERED
-        estimate, fields = fit.estimate, fit.fields
+        estimate = fit.estimate
     assert fit is not None
     return fit

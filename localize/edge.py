@@ -1,0 +1,72 @@
+"""The edge fit: bands of bins along the predicted outline, coarse to fine, as the beam's profile and clipping ask."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from localize.band import BandFit, fit_band
+from localize.noise import NoiseModel, linear_light
+from localize.prior import Estimate, Knowns
+from localize.profile import Profile
+from localize.start import Start
+from localize.verdict import COVERED, UNCERTAIN
+from localize.view import outlines
+from scene.scene import Scene
+
+#: bins across the patch, bins inside and outside the outline, iterations
+_SHARP = ((30, 3.0, 3.0, 6), (70, 4.0, 4.0, 4))
+_SOFT = ((30, 6.0, 2.0, 6), (65, 20.0, 3.0, 5), (100, 35.0, 5.0, 8))
+_CLIPPED = ((40, 8.0, 3.0, 6), (130, 20.0, 4.0, 5))
+#: a sharp edge and a clipped patch's rim end at full resolution: least bins inside, reach inside [mm], bins outside
+_FULL_SHARP = (5.0, 0.025, 5.0)
+_FULL_CLIPPED = (4.0, 0.015, 3.0)
+
+
+def is_sharp(scene: Scene) -> bool:
+    """Whether the beam's edge is a step rather than a slope."""
+    return Profile.of(scene.beam).angle_at(0.5) > 0.97 * scene.beam.half_angle
+
+
+def is_clipped(image: NDArray[np.generic], scene: Scene, start: Start) -> bool:
+    """Whether most of the middle of the patch is clipped, so that only its rim can be measured."""
+    points = outlines(Estimate.at(start.pose, scene))
+    if not len(points):
+        return False
+    column, row = np.round(points.mean(axis=0)).astype(int)
+    reach = max(2, int(0.2 * np.min(np.ptp(points, axis=0))))
+    cut = image[max(0, row - reach) : row + reach, max(0, column - reach) : column + reach]
+    stride = max(1, reach // 16)
+    return bool(cut.size and np.mean(linear_light(cut[::stride, ::stride], scene)[1]) > 0.3)
+
+
+def fit_edge(
+    image: NDArray[np.generic], scene: Scene, start: Start, knowns: Knowns, noise: NoiseModel
+) -> BandFit | str:
+    """The band fit, coarse to fine, or why there is none."""
+    points = outlines(Estimate.at(start.pose, scene))
+    if len(points) < 10:
+        return COVERED
+    spotlights = len(scene.spotlights)
+    size = float(np.max(np.ptp(points, axis=0))) / (1.0 if spotlights == 1 else 2.0)
+    sharp = is_sharp(scene)
+    full = sharp or is_clipped(image, scene, start)
+    plan = _SOFT if not full else _SHARP if sharp else _CLIPPED
+    stages = [(max(1, int(size / bins)), inner, outer, turns) for bins, inner, outer, turns in plan]
+    if full:
+        least, reach, outside = _FULL_SHARP if sharp else _FULL_CLIPPED
+        stages = [stage for stage in stages if stage[0] > 1]
+        stages.append((1, max(least, reach / scene.camera.pixel_pitch), outside, 8))
+    estimate = Estimate.at(start.pose, scene)
+    gains: tuple[float, ...] = ()
+    fit: BandFit | None = None
+    for number, (side, inner, outer, iterations) in enumerate(stages):
+        fit = fit_band(
+            image, estimate, gains, knowns, noise,
+            side=side, inner=inner, outer=outer, iterations=iterations, tied=number == 0,
+        )  # fmt: skip
+        if fit is None:
+            return UNCERTAIN if number else COVERED
+        estimate, gains = fit.estimate, fit.gains
+    assert fit is not None
+    return fit
