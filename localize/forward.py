@@ -12,6 +12,7 @@ the angle) is a plane, so the mean of g over the square is the second difference
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -142,10 +143,12 @@ def light(
         gx = np.einsum("ij,ij->i", across, sight.along_x)
         gy = np.einsum("ij,ij->i", across, sight.along_y)
         px, py = np.abs(gx) * stretch / 2.0, np.abs(gy) * stretch / 2.0
+        step = profile.coefficients[0, 0] > 0.0
         # at the foot of a soft edge too: it is all that a clipped patch shows
-        edge = np.flatnonzero(np.abs(w - profile.knots[0]) < 1.5 * (px + py))
+        edge = np.flatnonzero(np.abs(w - profile.knots[0]) < (1.5 if step else 4.0) * (px + py))
         if len(edge):
-            missing = (profile.knots[0] - w) / stretch
+            # a step counts where it is, a slope as the mean over the pixel
+            missing = (profile.knots[0] - w) / stretch if step else np.hypot(gx, gy) / math.sqrt(12.0)
             bend = _bend(sight, edge, (gx[edge], gy[edge]), to, d, c, across, missing, scene.eye.radius)
             w = w.copy()
             w[edge] += bend * (np.broadcast_to(stretch, w.shape)[edge])
