@@ -3,13 +3,14 @@
 Every frame's edge fit leaves the pose and the common quantities free under tight priors; their information, the
 priors taken off again, is added up over the frames with the poses eliminated. All axes pass through one RCM, which is
 what ties the frames together. A quantity is observable if the sequence makes its sigma at least three
-times smaller than its prior's.
+times smaller than its prior's. How much the frames disagree with each other beyond their own sigmas makes all sigmas
+larger: one texture misleads every frame, and only the others show by how much.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
-from dataclasses import dataclass
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,19 +19,30 @@ from localize.band import BandFit
 from localize.edge import fit_edge
 from localize.forward import tangents
 from localize.noise import NoiseModel, noise_of
-from localize.prior import FREE, Knowns, value
+from localize.prior import FREE, Knowns, value, with_value
 from localize.start import find_start
+from scene.beam import CyclesBeam
 from scene.document import InputError
-from scene.eye import Eye
 from scene.scene import Scene
 
 Array = NDArray[np.float64]
-NAMES = ("half_angle", "eye_radius", "camera_height", "rcm_x", "rcm_y", "rcm_z")
+NAMES = (*FREE, "rcm_x", "rcm_y", "rcm_z")
 _OBSERVABLE = 3.0
 _ROUNDS = 3
+#: sigma of what a scene does not have
+_FIXED = 1e-9
+_UNITS = {"half_angle": (180.0 / np.pi, " deg"), "softness": (1.0, "")}
+#: information below this share of the prior's is none: rounding pulls where a frame says nothing, as of the whole size
+_LEAST = 1e-2
 _OUTLIER = 30.0
 #: how a single frame's fit is held to the common values: it only has to be well conditioned
-_TIGHT = Knowns(0.02, 0.003, 0.01, 0.03)
+_TIGHT = Knowns(
+    rcm_sigma_mm=0.02,
+    half_angle_sigma_deg=0.003,
+    softness_sigma=0.01,
+    eye_radius_sigma_mm=0.01,
+    camera_height_sigma_mm=0.03,
+)
 
 
 @dataclass(frozen=True)
@@ -38,59 +50,48 @@ class Width:
     """Prior sigmas of a calibration: wide, but not so wide that a single frame cannot be fitted."""
 
     half_angle_deg: float = 0.1
+    softness: float = 0.1  #: of a `cycles` beam
     eye_radius_mm: float = 0.3
     camera_height_mm: float = 0.5
     rcm_mm: float = 0.2
     play_mm: float = 0.005  #: by how much the needle's axis misses the RCM at random
 
-    def sigmas(self) -> Array:
-        """In the order of `NAMES` and the units held inside."""
-        return np.array(
-            [np.radians(self.half_angle_deg), self.eye_radius_mm, self.camera_height_mm, *[self.rcm_mm] * 3]
-        )
+    def sigmas(self, scene: Scene) -> Array:
+        """In the order of `NAMES` and the units held inside; a beam without a softness has that of 0, exactly."""
+        softness = self.softness if _has_softness(scene) else _FIXED
+        own = [np.radians(self.half_angle_deg), softness, self.eye_radius_mm, self.camera_height_mm]
+        return np.array([*own, *[self.rcm_mm] * 3])
 
 
 @dataclass(frozen=True)
 class Calibration:
-    """What a sequence says about the scene's quantities `NAMES` [rad, mm]."""
+    """What a sequence says about the scene's quantities `NAMES` [rad, 1, mm]."""
 
-    values: Array  #: `[6]`
-    covariance: Array  #: `[6, 6]`
+    values: Array  #: `[7]`
+    covariance: Array  #: `[7, 7]`
     observable: dict[str, bool]
     frames: int  #: that took part
 
     @property
     def sigmas(self) -> Array:
-        """Standard deviations `[6]` [rad, mm]."""
+        """Standard deviations `[7]` [rad, 1, mm]."""
         return np.sqrt(np.diag(self.covariance))
 
     def statement(self) -> str:
         """One sentence a quantity: its value and sigma, or that the sequence does not tell."""
         lines = []
         for name, number, sigma in zip(NAMES, self.values, self.sigmas, strict=True):
-            factor, unit = (180.0 / np.pi, "deg") if name == "half_angle" else (1.0, "mm")
-            said = f"{number * factor:.4f} +- {sigma * factor:.4f} {unit}"
-            lines.append(
-                f"{name}: {said}" if self.observable[name] else f"{name}: not observable from this sequence ({said})"
-            )
+            if sigma <= _FIXED:
+                continue
+            factor, unit = _UNITS.get(name, (1.0, " mm"))
+            said = f"{number * factor:.4f} +- {sigma * factor:.4f}{unit}"
+            seen = self.observable[name]
+            lines.append(f"{name}: {said}" if seen else f"{name}: not observable from this sequence ({said})")
         return "\n".join(lines)
 
     def applied(self, scene: Scene) -> Scene:
         """The scene with the observable quantities replaced by what was found."""
-        found = dict(zip(NAMES, self.values, strict=True))
-        update: dict[str, object] = {}
-        if self.observable["half_angle"] and "half_angle" in type(scene.beam).model_fields:
-            update["beam"] = scene.beam.model_copy(update={"half_angle": float(found["half_angle"])})
-        if self.observable["eye_radius"]:
-            update["eye"] = Eye(radius=float(found["eye_radius"]))
-        if self.observable["camera_height"]:
-            update["camera"] = scene.camera.model_copy(update={"height": float(found["camera_height"])})
-        old = scene.instrument.rcm
-        rcm = tuple(
-            float(found[f"rcm_{c}"]) if self.observable[f"rcm_{c}"] else old[i] for i, c in enumerate(("x", "y", "z"))
-        )
-        update["instrument"] = scene.instrument.model_copy(update={"rcm": rcm})
-        return scene.model_copy(update=update)
+        return _with_values(scene, self.values, [self.observable[name] for name in NAMES])
 
 
 def calibrate(
@@ -108,7 +109,9 @@ def calibrate(
     """
     sensor = noise or noise_of(scene)
     nominal = _values(scene)
-    prior = 1.0 / np.square(width.sigmas())
+    widths = width.sigmas(scene)
+    prior = 1.0 / np.square(widths)
+    tight = replace(_TIGHT, softness_sigma=_TIGHT.softness_sigma if _has_softness(scene) else 0.0)
     now, found, used = scene, nominal, 0
     covariance = np.diag(1.0 / prior)
     for _ in range(_ROUNDS):
@@ -116,66 +119,114 @@ def calibrate(
         terms = []
         for image in frames():
             start = find_start(image, now)
-            fit = start if isinstance(start, str) else fit_edge(image, now, start, _TIGHT, sensor)
+            fit = start if isinstance(start, str) else fit_edge(image, now, start, tight, sensor)
             if not isinstance(fit, str) and fit.settled:
-                terms.append(_term(fit, now, width, 6 if len(scene.spotlights) > 1 else 5))
+                terms.append(_seen(*_term(fit, now, tight, width, 6 if len(scene.spotlights) > 1 else 5), widths))
         if len(terms) < 3:
             raise InputError("calibration needs at least three frames in which the patch can be measured")
         # a frame that a vessel or a glint misled pulls the others: its step is the longest
         pulls = np.array([float(g @ np.linalg.solve(i + np.diag(prior), g)) for i, g in terms])
         terms = [t for t, pull in zip(terms, pulls, strict=True) if pull <= _OUTLIER * np.median(pulls) + 1e-9]
-        system = np.diag(prior) + np.sum([i for i, _ in terms], axis=0)
-        right = prior * (nominal - here) + np.sum([g for _, g in terms], axis=0)
-        scale = np.sqrt(np.diag(system))
-        covariance = np.linalg.inv(system / np.outer(scale, scale)) / np.outer(scale, scale)
-        found, used = here + covariance @ right, len(terms)
-        now = _with_values(scene, found)
-    ratio = width.sigmas() / np.sqrt(np.diag(covariance))
+        step, _ = _combined(terms, prior, nominal - here, 1.0)
+        step, covariance = _combined(terms, prior, nominal - here, _disagreement(terms, step, widths))
+        found, used = here + step, len(terms)
+        now = _with_values(scene, found, [True] * len(NAMES))
+    ratio = widths / np.sqrt(np.diag(covariance))
     observable = {name: bool(r >= _OBSERVABLE) for name, r in zip(NAMES, ratio, strict=True)}
     return Calibration(found, covariance, observable, used)
 
 
+def _has_softness(scene: Scene) -> bool:
+    return isinstance(scene.beam, CyclesBeam)
+
+
 def _values(scene: Scene) -> Array:
-    return np.array([*[value(scene, name) for name in FREE], *scene.instrument.rcm])
+    own = [value(scene, name) if name != "softness" or _has_softness(scene) else 0.0 for name in FREE]
+    return np.array([*own, *scene.instrument.rcm])
 
 
-def _with_values(scene: Scene, values: Array) -> Scene:
-    names = ("half_angle",) if "half_angle" in type(scene.beam).model_fields else ()
-    return Calibration(values, np.eye(6), {name: name in names or name != "half_angle" for name in NAMES}, 0).applied(
-        scene
+def _with_values(scene: Scene, values: Array, taken: Sequence[bool]) -> Scene:
+    """The scene with those of the values `[7]` that are `taken`."""
+    for name, new, take in zip(FREE, values, taken, strict=False):
+        if take and (name != "softness" or _has_softness(scene)):
+            scene = with_value(scene, name, float(new))
+    own = len(FREE)
+    rcm = tuple(
+        float(new) if take else old
+        for old, new, take in zip(scene.instrument.rcm, values[own:], taken[own:], strict=True)
     )
+    return scene.model_copy(update={"instrument": scene.instrument.model_copy(update={"rcm": rcm})})
 
 
-def _term(fit: BandFit, scene: Scene, width: Width, size: int) -> tuple[Array, Array]:
-    """A frame's information on the six common quantities and its pull on them, its pose eliminated."""
+def _combined(terms: list[tuple[Array, Array]], prior: Array, off: Array, inflation: float) -> tuple[Array, Array]:
+    """The step that all frames and the prior, `off` away, agree on, and its covariance."""
+    system = np.diag(prior) + np.sum([i for i, _ in terms], axis=0) / inflation
+    right = prior * off + np.sum([g for _, g in terms], axis=0) / inflation
+    scale = np.sqrt(np.diag(system))
+    covariance = np.linalg.inv(system / np.outer(scale, scale)) / np.outer(scale, scale)
+    return covariance @ right, covariance
+
+
+def _seen(information: Array, pull: Array, widths: Array) -> tuple[Array, Array]:
+    """A frame's information and pull without the directions it says next to nothing about."""
+    sizes, axes = np.linalg.eigh(information * np.outer(widths, widths))
+    kept = axes[:, sizes > _LEAST]
+    part = (kept * sizes[sizes > _LEAST]) @ kept.T
+    return part / np.outer(widths, widths), kept @ (kept.T @ (pull * widths)) / widths
+
+
+def _disagreement(terms: list[tuple[Array, Array]], step: Array, widths: Array) -> float:
+    """How many times larger than by their own sigmas the frames' pulls scatter about `step`, squared; at least 1.
+
+    R. T. Birge, The calculation of errors by the method of least squares, Physical Review 40 (1932).
+    """
+    total, told = 0.0, 0
+    for information, pull in terms:
+        sizes, axes = np.linalg.eigh(information * np.outer(widths, widths))
+        seen = sizes > _LEAST / 2.0
+        off = (axes.T @ ((pull - information @ step) * widths))[seen]
+        total += float(np.sum(np.square(off) / sizes[seen]))
+        told += int(np.count_nonzero(seen))
+    return max(1.0, total / max(told - len(step), 1))
+
+
+def _term(fit: BandFit, scene: Scene, tight: Knowns, width: Width, size: int) -> tuple[Array, Array]:
+    """A frame's information on the common quantities and its pull on them, its pose eliminated."""
     estimate = fit.estimate
-    here = np.array([estimate.half_angle, estimate.scene.eye.radius, estimate.scene.camera.height])
-    nominal = _values(scene)[:3]
-    own_prior = 1.0 / np.square([_TIGHT.sigma(name) or np.inf for name in FREE])
+    free = tight.free
+    kept = [FREE.index(name) for name in free]
+    here, nominal = _values(estimate.scene)[kept], _values(scene)[kept]
+    own_prior = 1.0 / np.square([tight.sigma(name) or np.inf for name in free])
     u, v = tangents(estimate.pose.axis)
     offset = np.asarray(scene.instrument.rcm) - estimate.pose.apex
     along = float(offset @ estimate.pose.axis)
-    rows = np.zeros((2, size + 6))
+    own = size + len(free)
+    rows = np.zeros((2, own + 3))
     for k, unit in enumerate((u, v)):
         rows[k, :3], rows[k, 3 + k] = -unit, -along
-        rows[k, size + 3 :] = unit
+        rows[k, own:] = unit
     miss = np.array([u @ offset, v @ offset])
     # the frame's own priors come off again; at its minimum the data's slope is theirs turned round
     data = fit.information.copy()
-    data[np.arange(size, size + 3), np.arange(size, size + 3)] -= own_prior
+    data[np.arange(size, own), np.arange(size, own)] -= own_prior
     slope = np.concatenate([np.zeros(size), own_prior * (here - nominal)])
-    assert _TIGHT.rcm_sigma_mm is not None
-    tie = rows[:, : size + 3] / _TIGHT.rcm_sigma_mm
+    assert tight.rcm_sigma_mm is not None
+    tie = rows[:, :own] / tight.rcm_sigma_mm
     data -= tie.T @ tie
-    slope += tie.T @ (miss / _TIGHT.rcm_sigma_mm)
+    slope += tie.T @ (miss / tight.rcm_sigma_mm)
     # the same slope where the common quantities have the scene's values
     slope += data[:, size:] @ (here - nominal)
-    information, pull = np.zeros((size + 6, size + 6)), np.zeros(size + 6)
-    information[: size + 3, : size + 3] = data / fit.correlation
-    pull[: size + 3] = slope / fit.correlation
+    information, pull = np.zeros((own + 3, own + 3)), np.zeros(own + 3)
+    information[:own, :own] = data / fit.correlation
+    pull[:own] = slope / fit.correlation
     play = rows / width.play_mm
     information += play.T @ play
     pull -= play.T @ (miss / width.play_mm)
     pose, common = information[:size, :size], information[size:, :size]
     solved = np.linalg.solve(pose, np.column_stack([common.T, pull[:size]]))
-    return information[size:, size:] - common @ solved[:, :-1], pull[size:] - common @ solved[:, -1]
+    # a quantity that is not free here has no information
+    at = np.array([*kept, *range(len(FREE), len(NAMES))])
+    told, pulls = np.zeros((len(NAMES), len(NAMES))), np.zeros(len(NAMES))
+    told[np.ix_(at, at)] = information[size:, size:] - common @ solved[:, :-1]
+    pulls[at] = pull[size:] - common @ solved[:, -1]
+    return told, pulls

@@ -13,6 +13,7 @@ the angle) is a plane, so the mean of g over the square is the second difference
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -117,15 +118,22 @@ class Light:
     """Spotlight irradiance at N pixels, for unit on-axis intensity, and its derivatives."""
 
     value: Array  #: f sum_k G_k `[N]` [1/mm^2]
-    jacobian: Array  #: `[P, N]`: per mm of the apex, per rad along U, V (and roll), then per rad of half angle if asked
+    jacobian: Array  #: `[P, N]`: per mm of the apex, per rad along U, V (and roll), then per unit of every change
 
 
 def light(
-    sight: Sight, pose: Pose, scene: Scene, profile: Profile, *, roll: bool = False, half_angle: bool = False
+    sight: Sight,
+    pose: Pose,
+    scene: Scene,
+    profile: Profile,
+    *,
+    roll: bool = False,
+    changes: Sequence[tuple[Profile, Profile, float]] = (),
 ) -> Light:
     """The spotlights' irradiance on what `sight` sees: the cones' pixel means times cosine over distance squared.
 
-    With `roll` the sixth pose parameter gets its row of the Jacobian, with `half_angle` the profile's half angle too.
+    With `roll` the sixth pose parameter gets its row of the Jacobian. Each of the `changes` gets one too: the profile
+    at a little more and a little less of some quantity, and how much lies between them.
     """
     axes = spotlight_axes(pose, scene.spotlights)
     basis = rotation_basis(pose.axis)[: 3 if roll else 2]
@@ -135,7 +143,7 @@ def light(
     to /= d[:, None]
     cosine = -np.einsum("ij,ij->i", sight.normals, to)
     f = np.maximum(cosine, 0.0) / d2
-    total, rows = np.zeros(len(d)), np.zeros((3 + len(basis) + half_angle, len(d)))
+    total, rows = np.zeros(len(d)), np.zeros((3 + len(basis) + len(changes), len(d)))
     for axis in axes:
         c = to @ axis
         across = (axis - c[:, None] * to) / d[:, None]  # gradient of c over the surface point [1/mm]
@@ -158,8 +166,8 @@ def light(
         rows[:3] -= slope * across.T
         for j, vector in enumerate(basis):
             rows[3 + j] += slope * (to @ np.cross(vector, axis))
-        if half_angle:
-            rows[-1] += f * profile.half_angle_slope(w, px, py)
+        for j, (more, less, between) in enumerate(changes, start=3 + len(basis)):
+            rows[j] += f * (more.mean(w, px, py)[0] - less.mean(w, px, py)[0]) / between
     value = total * f
     falloff = (sight.normals / d2[:, None] + 3.0 * (cosine / d2)[:, None] * to) / d[:, None]
     rows[:3] += np.where(cosine > 0.0, total, 0.0) * falloff.T

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from localize.forward import look, rotation_basis
-from localize.prior import Estimate, Knowns, prior_rows, value, with_value
+from localize.prior import BEAM, Estimate, Knowns, prior_rows, value, with_value
 from localize.solve import Problem, Solution, minimize
 from scene.pose import Pose
 from scene.scene import Scene
@@ -32,7 +32,7 @@ def distances(pixels: Array, spots: NDArray[np.intp], estimate: Estimate, *, rol
     perpendicular = np.cross(to, axes)
     s = np.maximum(np.linalg.norm(perpendicular, axis=1), 1e-12)
     # the arc tangent keeps full precision where the arc cosine loses half the digits
-    residual = np.arctan2(s, c) - estimate.half_angle
+    residual = np.arctan2(s, c) - estimate.scene.beam.half_angle
     across = -(axes - c[:, None] * to) / (d * s)[:, None]  # gradient of the angle over the surface point
     gx, gy = (np.einsum("ij,ij->i", across, along) for along in (sight.along_x, sight.along_y))
     slope = np.hypot(gx, gy)
@@ -53,16 +53,14 @@ def outline_problem(
         r, jac, by_angle = distances(pixels, spots, estimate, roll=roll)
         columns = [jac]
         for name in knowns.free:
-            if name == "half_angle":
-                columns.append(by_angle[:, None])
+            if name in BEAM:
+                # the outline is where the beam ends, however softly
+                columns.append(by_angle[:, None] if name == "half_angle" else np.zeros((len(pixels), 1)))
                 continue
             here, step = value(estimate.scene, name), _STEP[name]
             sides = [
                 distances(
-                    pixels,
-                    spots,
-                    Estimate(estimate.pose, with_value(estimate.scene, name, here + s), estimate.half_angle),
-                    roll=roll,
+                    pixels, spots, Estimate(estimate.pose, with_value(estimate.scene, name, here + s)), roll=roll
                 )[0]
                 for s in (step, -step)
             ]
@@ -82,7 +80,6 @@ def fit_outline(
     knowns: Knowns = Knowns(),  # noqa: B008  frozen
     start: Pose | None = None,
     robust: bool = True,
-    half_angle: float | None = None,
 ) -> Solution | None:
     """The pose whose cones meet the scene's surface in an outline through `pixels` `[N, 2]` [px].
 
@@ -93,10 +90,10 @@ def fit_outline(
     points = np.asarray(pixels, float)
     which = np.zeros(len(points), np.intp) if spots is None else spots
     roll = len(scene.spotlights) > 1
-    pose = start if start is not None else start_pose(points, which, scene, half_angle)
+    pose = start if start is not None else start_pose(points, which, scene)
     if pose is None or len(points) < 6:
         return None
-    first = Estimate(pose, scene, scene.beam.half_angle if half_angle is None else half_angle)
+    first = Estimate(pose, scene)
     if start is None:
         exact = Knowns(rcm_sigma_mm=1e-3)
         tied = minimize(
@@ -109,7 +106,7 @@ def fit_outline(
     return minimize(problem, first, 6 if roll else 5, knowns.free, robust=robust, tolerance=1e-11)
 
 
-def start_pose(pixels: Array, spots: NDArray[np.intp], scene: Scene, half_angle: float | None = None) -> Pose | None:
+def start_pose(pixels: Array, spots: NDArray[np.intp], scene: Scene) -> Pose | None:
     """The pose through the RCM whose cone is about as wide as the points `[N, 2]` [px] where it meets the surface."""
     points = look(scene, pixels).points
     points = points[np.all(np.isfinite(points), axis=1)]
@@ -118,7 +115,7 @@ def start_pose(pixels: Array, spots: NDArray[np.intp], scene: Scene, half_angle:
     centre = points.mean(axis=0)
     rcm = np.asarray(scene.instrument.rcm)
     towards = (centre - rcm) / np.linalg.norm(centre - rcm)
-    beta = scene.beam.half_angle if half_angle is None else half_angle
+    beta = scene.beam.half_angle
     # the widest spotlight's reach off the needle's axis
     down = np.array([0.0, 0.0, -1.0])
     offsets = spotlight_axes(Pose(np.zeros(3), down), scene.spotlights)

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from localize.forward import moved, tangents
 from localize.profile import Profile
+from scene.beam import CyclesBeam, stretched
 from scene.document import InputError
 from scene.pose import Pose
 from scene.scene import Scene
@@ -21,7 +22,12 @@ from scene.scene import Scene
 Array = NDArray[np.float64]
 #: an "exactly" known RCM: far below anything an image can tell, yet well conditioned
 _EXACT_MM = 1e-6
-FREE = ("half_angle", "eye_radius", "camera_height")
+#: what may be free beside the pose; the first two are the beam's, which alone changes with them
+FREE = ("half_angle", "softness", "eye_radius", "camera_height")
+BEAM = FREE[:2]
+_BEAM_STEP = {"half_angle": 1e-6, "softness": 1e-4}
+#: a softness below is a hard edge to every camera
+_HARDEST = 1e-3
 
 
 @dataclass(frozen=True)
@@ -33,6 +39,7 @@ class Knowns:
 
     rcm_sigma_mm: float | None = 0.05
     half_angle_sigma_deg: float | None = 0.0
+    softness_sigma: float | None = 0.0  #: of a `cycles` beam's blend
     eye_radius_sigma_mm: float | None = 0.0
     camera_height_sigma_mm: float | None = 0.0
 
@@ -47,21 +54,32 @@ class Knowns:
         return tuple(name for name in FREE if self.sigma(name) != 0.0)
 
     def sigma(self, name: str) -> float | None:
-        """Sigma of one of `FREE` in the unit held inside [rad, mm]; None if free."""
+        """Sigma of one of `FREE` in the unit held inside [rad, 1, mm, mm]; None if free."""
         if name == "half_angle":
             return None if self.half_angle_sigma_deg is None else math.radians(self.half_angle_sigma_deg)
+        if name == "softness":
+            return self.softness_sigma
         return self.eye_radius_sigma_mm if name == "eye_radius" else self.camera_height_sigma_mm
 
 
 def value(scene: Scene, name: str) -> float:
-    """The scene's value of one of `FREE` [rad, mm]."""
+    """The scene's value of one of `FREE` [rad, 1, mm, mm]. Raises InputError for the softness of a beam without one."""
     if name == "half_angle":
         return scene.beam.half_angle
+    if name == "softness":
+        if not isinstance(scene.beam, CyclesBeam):
+            raise InputError(f"knowns: a {scene.beam.kind} beam has no softness; describe it as a cycles beam")
+        return scene.beam.blend
     return scene.eye.radius if name == "eye_radius" else scene.camera.height
 
 
 def with_value(scene: Scene, name: str, new: float) -> Scene:
-    """The scene with another value of `eye_radius` or `camera_height` [mm]; a half angle is the profile's affair."""
+    """The scene with another value of one of `FREE` [rad, 1, mm, mm]."""
+    if name == "half_angle":
+        return scene.model_copy(update={"beam": stretched(scene.beam, new)})
+    if name == "softness":
+        # a fit may look a little beyond the softest beam there is
+        return scene.model_copy(update={"beam": scene.beam.model_copy(update={"blend": max(new, _HARDEST)})})
     if name == "eye_radius":
         return scene.model_copy(update={"eye": scene.eye.model_copy(update={"radius": new})})
     return scene.model_copy(update={"camera": scene.camera.model_copy(update={"height": new})})
@@ -73,27 +91,37 @@ class Estimate:
 
     pose: Pose
     scene: Scene
-    half_angle: float  #: [rad]
 
     @classmethod
     def at(cls, pose: Pose, scene: Scene) -> Estimate:
         """The estimate with the scene's own values."""
-        return cls(pose, scene, scene.beam.half_angle)
+        return cls(pose, scene)
+
+    @property
+    def half_angle(self) -> float:
+        """The beam's half angle [rad]."""
+        return self.scene.beam.half_angle
 
     @property
     def profile(self) -> Profile:
-        """The beam's profile at the estimated half angle."""
-        return Profile.of(self.scene.beam, self.half_angle)
+        """The beam's profile."""
+        return Profile.of(self.scene.beam)
+
+    def beam_changes(self, free: tuple[str, ...]) -> list[tuple[Profile, Profile, float]]:
+        """The profile at a little more and less of each free quantity of the beam, and how much lies between."""
+        found = []
+        for name in (name for name in free if name in BEAM):
+            here, step = value(self.scene, name), _BEAM_STEP[name]
+            more, less = (Profile.of(with_value(self.scene, name, here + s).beam) for s in (step, -step))
+            found.append((more, less, 2.0 * step))
+        return found
 
     def moved(self, step: Array, pose_size: int, free: tuple[str, ...]) -> Estimate:
         """The estimate after `step`: pose parameters first, then the free quantities."""
-        scene, half_angle = self.scene, self.half_angle
+        scene = self.scene
         for name, delta in zip(free, step[pose_size:], strict=True):
-            if name == "half_angle":
-                half_angle += float(delta)
-            else:
-                scene = with_value(scene, name, value(scene, name) + float(delta))
-        return Estimate(moved(self.pose, step[:pose_size]), scene, half_angle)
+            scene = with_value(scene, name, value(scene, name) + float(delta))
+        return Estimate(moved(self.pose, step[:pose_size]), scene)
 
 
 def rcm_miss(pose: Pose, scene: Scene) -> Array:
@@ -125,6 +153,5 @@ def prior_rows(estimate: Estimate, nominal: Scene, knowns: Knowns, pose_size: in
             row = np.zeros(size)
             row[pose_size + j] = 1.0 / spread
             rows.append(row)
-            now = estimate.half_angle if name == "half_angle" else value(estimate.scene, name)
-            residuals.append((now - value(nominal, name)) / spread)
+            residuals.append((value(estimate.scene, name) - value(nominal, name)) / spread)
     return np.array(residuals).reshape(-1), np.array(rows).reshape(-1, size)

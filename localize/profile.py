@@ -25,7 +25,6 @@ class Profile:
     coefficients: Array  #: of g in (w - knot), constant first `[S, D]`
     cosine: bool  #: whether w is the cosine; otherwise minus the angle [rad]
     half_angle: float  #: [rad]
-    beam: Beam
 
     def __post_init__(self) -> None:
         """Integrate g twice, piece by piece."""
@@ -34,25 +33,25 @@ class Profile:
         object.__setattr__(self, "_twice", _integrate(self.knots, once))
 
     @classmethod
-    def of(cls, beam: Beam, half_angle: float | None = None) -> Profile:
-        """The profile of a beam; with `half_angle` [rad] of the same beam stretched to that half angle."""
-        b = beam.half_angle if half_angle is None else half_angle
+    def of(cls, beam: Beam) -> Profile:
+        """The profile of a beam."""
+        b = beam.half_angle
         if isinstance(beam, HardBeam):
-            return cls(np.array([math.cos(b)]), np.array([[1.0]]), True, b, beam)
+            return cls(np.array([math.cos(b)]), np.array([[1.0]]), True, b)
         if isinstance(beam, CyclesBeam):
             low = math.cos(b)
             ramp = beam.blend * (1.0 - low)
             pieces = np.array([[0.0, 0.0, 3.0 / ramp**2, -2.0 / ramp**3], [1.0, 0.0, 0.0, 0.0]])
-            return cls(np.array([low, low + ramp]), pieces, True, b, beam)
+            return cls(np.array([low, low + ramp]), pieces, True, b)
         if isinstance(beam, LinearBeam):
             angles, values = np.array([beam.beam_width, beam.half_angle]), np.array([1.0, 0.0])
         else:
             assert isinstance(beam, TabulatedBeam)
             angles, values = np.asarray(beam.angles), np.asarray(beam.intensities)
-        w = -angles[::-1] * (b / beam.half_angle)
+        w = -angles[::-1]
         g = values[::-1]
         slopes = np.append(np.diff(g) / np.diff(w), 0.0)
-        return cls(w, np.stack([g, slopes], axis=1), False, b, beam)
+        return cls(w, np.stack([g, slopes], axis=1), False, b)
 
     def variable(self, cosine: Array) -> tuple[Array, Array | float]:
         """w at cosines of the angle off the axis, and |dw / dcosine|."""
@@ -98,12 +97,6 @@ class Profile:
         h = [self._piecewise(once, x) for x in corners]
         slope[edge] = (h[0] - h[1] - h[2] + h[3]) / area
         return mean, slope
-
-    def half_angle_slope(self, w: Array, px: Array, py: Array) -> Array:
-        """Derivative of `mean` by the half angle [1/rad], by central differences."""
-        step = 1e-6
-        wide, narrow = (Profile.of(self.beam, self.half_angle + s) for s in (step, -step))
-        return (wide.mean(w, px, py)[0] - narrow.mean(w, px, py)[0]) / (2.0 * step)
 
     def _piecewise(self, coefficients: Array, w: Array) -> Array:
         if len(self.knots) == 1:

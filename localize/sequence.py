@@ -41,7 +41,7 @@ class AmbientMap:
         start = find_start(image, self._scene)
         if isinstance(start, str):
             return False
-        points = outlines(Estimate.at(start.pose, self._scene))
+        points = outlines(Estimate(start.pose, self._scene))
         if not len(points):
             return False
         if self._sum is None:

@@ -8,6 +8,7 @@ electrons; uniform albedo, or albedo known exactly; gain and offset unknown.
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -15,7 +16,7 @@ from numpy.typing import NDArray
 
 from localize.forward import Light, light, look, window
 from localize.outline import distances
-from localize.prior import Estimate, Knowns, prior_rows, value, with_value
+from localize.prior import BEAM, Estimate, Knowns, prior_rows, value, with_value
 from localize.profile import Profile
 from scene.pose import Pose
 from scene.scene import Scene
@@ -81,23 +82,20 @@ def cramer_rao(
     pixels = patch_pixels(scene, pose)
     roll = len(scene.spotlights) > 1
     size = 6 if roll else 5
-    profile = Profile.of(scene.beam)
-    here = _light(scene, pose, profile, pixels, roll=roll, half_angle="half_angle" in knowns.free)
+    changes = Estimate(pose, scene).beam_changes(knowns.free)
+    here = _light(scene, pose, pixels, roll=roll, changes=changes)
     peak = float(np.quantile(here.value[here.value > 0.0], 0.999)) if np.any(here.value > 0.0) else 0.0
     if peak <= 0.0:
         raise ValueError("the frame shows no patch of this pose")
     gain = sensor.peak / peak
     rows = [gain * here.jacobian[:size]]
-    for name in knowns.free:
-        if name == "half_angle":
-            rows.append(gain * here.jacobian[-1:])
-        else:
-            rows.append(gain * _difference(scene, pose, profile, pixels, name)[None])
+    rows.append(gain * here.jacobian[size:])
+    rows += [gain * _difference(scene, pose, pixels, name)[None] for name in knowns.free if name not in BEAM]
     nuisance = np.stack([gain * here.value, np.ones(len(pixels))])
     jacobian = np.concatenate([*rows, nuisance])
     information = (jacobian / (gain * here.value + sensor.background**2)) @ jacobian.T
     count = size + len(knowns.free)
-    _, prior = prior_rows(Estimate.at(pose, scene), scene, knowns, size)
+    _, prior = prior_rows(Estimate(pose, scene), scene, knowns, size)
     information[:count, :count] += prior.T @ prior
     scale = np.sqrt(np.diag(information))
     if np.any(scale == 0.0):
@@ -109,23 +107,25 @@ def cramer_rao(
     return Bound(covariance[:size, :size])
 
 
-def _light(scene: Scene, pose: Pose, profile: Profile, pixels: Array, *, roll: bool, half_angle: bool) -> Light:
+def _light(
+    scene: Scene,
+    pose: Pose,
+    pixels: Array,
+    *,
+    roll: bool = False,
+    changes: Sequence[tuple[Profile, Profile, float]] = (),
+) -> Light:
     sight = look(scene, pixels)
     seen = np.isfinite(sight.points[:, 0])
     if not seen.all():
         pixels = pixels[seen]
         sight = look(scene, pixels)
-    return light(sight, pose, scene, profile, roll=roll, half_angle=half_angle)
+    return light(sight, pose, scene, Profile.of(scene.beam), roll=roll, changes=changes)
 
 
-def _difference(scene: Scene, pose: Pose, profile: Profile, pixels: Array, name: str) -> Array:
+def _difference(scene: Scene, pose: Pose, pixels: Array, name: str) -> Array:
     step = 1e-4
-    sides = [
-        _light(
-            with_value(scene, name, value(scene, name) + s), pose, profile, pixels, roll=False, half_angle=False
-        ).value
-        for s in (step, -step)
-    ]
+    sides = [_light(with_value(scene, name, value(scene, name) + s), pose, pixels).value for s in (step, -step)]
     return (sides[0] - sides[1]) / (2.0 * step)
 
 
@@ -173,10 +173,8 @@ def _believed(scene: Scene, pose: Pose, name: str, error: float, *, rcm: bool) -
     outlines = [scene.camera.project(scene.outline(pose, k, 256)) for k in range(len(scene.spotlights))]
     spots = np.repeat(np.arange(len(outlines)), 256)
     pixels = np.concatenate(outlines)
-    believed, half_angle = scene, scene.beam.half_angle
-    if name == "half_angle":
-        half_angle += error
-    elif name == "focal_length":
+    believed = scene
+    if name == "focal_length":
         camera = scene.camera.model_copy(update={"focal_length": scene.camera.focal_length + error})
         believed = scene.model_copy(update={"camera": camera})
     elif name.startswith("rcm"):
@@ -186,7 +184,7 @@ def _believed(scene: Scene, pose: Pose, name: str, error: float, *, rcm: bool) -
         believed = scene.model_copy(update={"instrument": scene.instrument.model_copy(update={"rcm": moved})})
     else:
         believed = with_value(scene, name, value(scene, name) + error)
-    return _step(pixels, spots, Estimate(pose, believed, half_angle), rcm=rcm)
+    return _step(pixels, spots, Estimate(pose, believed), rcm=rcm)
 
 
 def smoothed_over(scene: Scene, pose: Pose, *, rcm: bool) -> Array:
@@ -194,7 +192,7 @@ def smoothed_over(scene: Scene, pose: Pose, *, rcm: bool) -> Array:
     outlines = [scene.camera.project(scene.outline(pose, k, 256)) for k in range(len(scene.spotlights))]
     smooth = scene.model_copy(update={"surface": Surface()})
     spots = np.repeat(np.arange(len(outlines)), 256)
-    return _step(np.concatenate(outlines), spots, Estimate.at(pose, smooth), rcm=rcm)
+    return _step(np.concatenate(outlines), spots, Estimate(pose, smooth), rcm=rcm)
 
 
 def _step(pixels: Array, spots: NDArray[np.intp], at: Estimate, *, rcm: bool) -> Array:

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from localize.forward import Sight, ambient_irradiance, light, light_by_surface, look, window
 from localize.noise import NoiseModel, linear_light
 from localize.occlusion import covered
-from localize.prior import Estimate, Knowns, value, with_value
+from localize.prior import BEAM, Estimate, Knowns, value, with_value
 from scene.scene import Scene
 from scene.spotlights import spotlight_axes
 
@@ -181,12 +181,10 @@ def spotlight_irradiance(
     free = knowns.free
     seen = look(estimate.scene, pixels, side) if {"eye_radius", "camera_height"} & set(free) else sight
     profile = estimate.profile
-    here = light(seen, estimate.pose, estimate.scene, profile, roll=roll, half_angle="half_angle" in free)
-    rows = [here.jacobian[: 6 if roll else 5]]
-    for name in free:
-        if name == "half_angle":
-            rows.append(here.jacobian[-1:])
-            continue
+    changes = estimate.beam_changes(free)
+    here = light(seen, estimate.pose, estimate.scene, profile, roll=roll, changes=changes)
+    rows = [here.jacobian]
+    for name in (name for name in free if name not in BEAM):
         plus, minus = (
             look(with_value(estimate.scene, name, value(estimate.scene, name) + step), pixels, side)
             for step in (_STEP, -_STEP)

@@ -86,7 +86,7 @@ def test_a_free_half_angle_is_found_from_three_outlines():
     spots = np.repeat(np.arange(3), 200)
     fit = fit_outline(outline(true, pose), believed, spots=spots, knowns=knowns, start=pose, robust=False)
     assert fit is not None
-    assert math.degrees(fit.estimate.half_angle) == pytest.approx(9.05, abs=1e-6)
+    assert math.degrees(fit.estimate.scene.beam.half_angle) == pytest.approx(9.05, abs=1e-6)
 
 
 def test_wild_points_on_a_vessel_do_not_pull_the_cone():

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from localize import Knowns, Localization, SensorNoise, locate
-from localize.calibration import calibrate
+from localize.calibration import NAMES, calibrate
 from localize.sequence import locate_sequence
 from localize.theory import cramer_rao
 from scene import InputError, Pose
@@ -217,9 +217,40 @@ def test_calibration_finds_the_half_angle_of_a_rig_and_says_that_the_size_of_the
     assert "camera_height: not observable" in found.statement()
 
 
+def test_calibration_finds_the_softness_of_the_edge_over_a_texture_and_states_an_honest_sigma():
+    """A blend of 0.3 believed to be 0.35, eight frames over a fundus' texture; within 4 sigmas, and to 0.02."""
+    true = scene_of(CyclesBeam(blend=0.3))
+    believed = scene_of(CyclesBeam(blend=0.35))
+    poses = [true.pose(np.array([2.0 * math.sin(t), 2.0 * math.cos(t), 2.5 + 0.4 * t])) for t in range(8)]
+    frames = [photograph(true, pose, fundus(0.2), seed=i) for i, pose in enumerate(poses)]
+    found = calibrate(lambda: frames, believed, noise=NOISE)
+    softness = NAMES.index("softness")
+    assert found.observable["softness"]
+    assert found.values[softness] == pytest.approx(0.3, abs=0.02)
+    assert abs(found.values[softness] - 0.3) < 4.0 * found.sigmas[softness]
+    assert found.applied(believed).beam.blend == pytest.approx(found.values[softness])
+
+
+def test_one_spotlight_tells_neither_half_angle_nor_camera_height_and_says_so():
+    """Half angle, height and RCM are off; what is not observable keeps a wide sigma and stays as it was."""
+    true = scene_of(HardBeam(half_angle=math.radians(9.03)), instrument={"rcm": (6.05, -0.04, 22.1)})
+    believed = scene_of(HardBeam())
+    poses = [true.pose(np.array([2.0 * math.sin(t), 2.0 * math.cos(t), 2.5 + 0.4 * t])) for t in range(6)]
+    frames = [photograph(true, pose, seed=i, rays=6) for i, pose in enumerate(poses)]
+    found = calibrate(lambda: frames, believed, noise=NOISE)
+    truth = np.array([math.radians(9.03), 0.0, 12.0, 110.0, 6.05, -0.04, 22.1])
+    assert np.all(np.abs(found.values - truth) < 4.0 * found.sigmas)
+    assert not found.observable["half_angle"]
+    assert not found.observable["camera_height"]
+    assert found.applied(believed).camera == believed.camera
+    assert "softness" not in found.statement()
+
+
 def test_knowns_refuse_nonsense_and_published_methods_refuse_knowns():
     with pytest.raises(InputError, match="rcm_sigma_mm"):
         Knowns(rcm_sigma_mm=-1.0)
     scene = scene_of(HardBeam(), resolution=100)
+    with pytest.raises(InputError, match="no softness"):
+        cramer_rao(scene, scene.pose(np.array([0.0, 0.0, 4.0])), knowns=Knowns(softness_sigma=0.1))
     with pytest.raises(InputError, match="no use for knowns"):
         locate(np.zeros((100, 100), np.uint8), scene, "paper", knowns=FREE)
