@@ -16,16 +16,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from localize.forward import ambient_irradiance, look
-from localize.noise import NoiseModel, linear_light
+from localize.noise import NoiseModel
 from localize.outline import distances
 from localize.prior import Estimate, Knowns, prior_rows
 from localize.solve import rest, student_bend, student_weights
 from localize.start import nearest_outline
-from localize.strips import Eliminated, Strips, score_covariance, strip_scores
-from localize.view import spotlight_irradiance
+from localize.strips import WIDTH, Eliminated, Strips, score_covariance, strip_scores
+from localize.view import Channel, Unlit, Window, shown_in, spotlight_irradiance
 
 Array = NDArray[np.float64]
-_STRIP_BINS = 2.0  # width of a strip along the outline
 #: where the spreads of the strips' log albedo start: level, and gradient per mm of a fundus in green light
 _LEVEL, _SLOPE_PER_MM = 0.3, 3.0
 _SMALLEST = 1e-3  # spread of levels, and of slopes over the width of the band
@@ -39,9 +38,7 @@ SETTLED_SIGMAS = 1.0
 @dataclass(frozen=True)
 class _Band:
     pixels: Array  #: centres of the bins `[N, 2]` [px]
-    signal: Array  #: `[C, N]` [white]
-    usable: NDArray[np.bool_]  #: `[C, N]`
-    clipped: NDArray[np.bool_]  #: `[C, N]`
+    shown: tuple[Channel, ...]  #: what the bins show, `[N]` each
     strips: Strips
     covered: float  #: share of the outlines in the frame
 
@@ -50,9 +47,7 @@ class _Band:
 class _Channel:
     """One channel's nuisances, and its bins' residuals as they stand."""
 
-    signal: Array
-    usable: NDArray[np.bool_]
-    clipped: NDArray[np.bool_]
+    shown: Channel
     strips: Strips
     noise: NoiseModel
     bins: int  #: pixels in a bin
@@ -60,29 +55,34 @@ class _Channel:
     spread: Array  #: prior sigma of levels and slopes `[2]`
     smallest: Array  #: `[2]`
     level: float = math.nan  #: log albedo of all strips
+    slow: Array = field(default_factory=lambda: np.zeros(0))  #: slopes that vary slowly around the outlines
+    slow_spread: float = 0.0  #: and their prior sigma
     levels: Array = field(default_factory=lambda: np.zeros((0, 2)))  #: of each strip beyond it, and slope `[S, 2]`
     white: float = 0.05  #: what residuals scatter beyond the sensor's noise
 
     def evaluate(self, irradiance: Array, light: Array, rows: Array) -> None:
         """Residuals, weights and Jacobian where the spotlights' light is `light` `[N]` with derivatives `rows`."""
-        g = math.exp(self.gain)
-        brightness = irradiance + g * light
+        g, shown = math.exp(self.gain), self.shown
+        incident = irradiance + g * light
+        brightness = np.exp(shown.template) * incident
         if math.isnan(self.level):
-            ratio = self.strips.sums(np.where(self.usable, np.clip(self.signal / brightness, 0.0, None), 0.0))
-            number = self.strips.sums(self.usable.astype(float))
+            ratio = self.strips.sums(np.where(shown.usable, np.clip(shown.signal / brightness, 0.0, None), 0.0))
+            number = self.strips.sums(shown.usable.astype(float))
             overall = max(float(ratio.sum() / max(number.sum(), 1.0)), 1e-9)
             mean = np.where(number > 0, ratio / np.maximum(number, 1.0), overall)
             self.level = math.log(overall)
             self.levels = np.stack([np.log(np.clip(mean / overall, 0.05, 20.0)), np.zeros(len(mean))], axis=1)
-        model = np.exp(self.level + self.strips.log_albedo(self.levels)) * brightness
-        relative = self.signal / model - 1.0
-        residual = np.where(np.abs(relative) < 0.5, relative, np.log(np.maximum(self.signal, 0.02 * model) / model))
-        bound = self.clipped & (model < 1.0)
+            self.slow, self.slow_spread = np.zeros(len(self.strips.slow)), float(self.spread[1])
+        albedo = self.level + self.slow @ self.strips.slow + self.strips.log_albedo(self.levels)
+        model = np.exp(albedo) * brightness
+        relative = shown.signal / model - 1.0
+        residual = np.where(np.abs(relative) < 0.5, relative, np.log(np.maximum(shown.signal, 0.02 * model) / model))
+        bound = shown.clipped & (model < 1.0)
         residual[bound] = -np.log(np.maximum(model[bound], 1e-6))
-        use = self.usable | bound
+        use = shown.usable | bound
         variance = self.noise.variance(model) / self.bins / np.square(np.maximum(model, 1e-9))
         # the scatter that counts is that of the bins which hold the edge, and it tells how far the edge still is off
-        pull = np.abs(rows[2]) / brightness
+        pull = np.abs(rows[2]) / incident
         steady = use & (pull > 0.3 * np.quantile(pull, 0.98))
         if np.count_nonzero(steady) > 30:
             self.white = rest(residual[steady], variance[steady], self.white)
@@ -90,13 +90,17 @@ class _Channel:
         whitened = residual / np.sqrt(variance)
         self.weights = use / variance * student_weights(whitened)
         self.misfit = float(np.sqrt(np.mean(np.minimum(np.square(whitened[use]), 25.0)))) if use.any() else math.inf
-        self.jacobian = np.concatenate(
-            [g / brightness * rows, (g / brightness * light)[None], np.ones((1, len(model)))]
-        )
+        share = g / incident
+        self.jacobian = np.concatenate([share * rows, (share * light)[None], np.ones((1, len(model))), self.strips.slow])
         self.residual = residual
         # a robust fit follows its data by the slope of their influence, where least squares goes by the weight
-        effect = self.weights * np.square(self.jacobian[-2])
+        effect = self.weights * np.square(self.jacobian[len(rows)])
         self.follows = max(0.3, float(np.sum(effect * student_bend(whitened)) / max(np.sum(effect), 1e-300)))
+
+    @property
+    def precision(self) -> Array:
+        """Prior precision of gain, level and slow slopes."""
+        return np.concatenate([[1e-9, 1e-9], np.full(len(self.slow), self.slow_spread**-2)])
 
     def eliminated(self) -> Eliminated:
         """The normal equations of pose, free quantities, gain and level without the strips' own levels."""
@@ -109,12 +113,16 @@ class _Channel:
 
     def learn(self, part: Eliminated, step: Array) -> None:
         """Take a step `[P]`: gain, level, the strips' levels and, from those, how much they scatter (MacKay 1992)."""
-        self.gain += float(step[-2])
-        self.level += float(step[-1])
+        own = step[-2 - len(self.slow) :]
+        self.gain += float(own[0])
+        self.level += float(own[1])
+        self.slow = self.slow + own[2:]
         self.levels = part.levels(step)
         known = np.maximum(1.0 - part.variance / self.spread**2, 0.0).sum(axis=0)
         found = np.sqrt(np.square(self.levels).sum(axis=0) / np.maximum(known, 1.0))
         self.spread = np.clip(found, self.smallest, 5.0 * self.spread)
+        # albedo has no direction: across the outline it changes as much as along
+        self.slow_spread = max(self.strips.slow_gradient(self.levels[:, 0]), float(self.smallest[1]))
 
 
 @dataclass(frozen=True)
@@ -155,12 +163,16 @@ class BandFit:
         """Covariance of the pose and the free quantities `[P, P]` as the strips' residuals show it (a sandwich)."""
         size, strips = len(self.information), self.channels[0].strips
         scores, parts = np.zeros((strips.count, size)), np.zeros((strips.count, size, size))
+        known = self.prior.T @ self.prior
         for channel in self.channels:
             gradient, own = channel.scores()
-            reduced = _reduction(own.sum(axis=0), size)
+            whole = own.sum(axis=0)
+            whole[range(size, len(whole)), range(size, len(whole))] += channel.precision
+            reduced = _reduction(whole, size)
+            known = known + (reduced[:, size:] * channel.precision) @ reduced[:, size:].T
             scores = scores + gradient @ reduced.T / channel.follows
             parts = parts + reduced @ own @ reduced.T
-        meat = score_covariance(strips, scores, parts) + self.prior.T @ self.prior
+        meat = score_covariance(strips, scores, parts) + known
         scale = np.sqrt(np.maximum(np.diag(self.information), 1e-300))
         bread = np.linalg.inv(self.information / np.outer(scale, scale)) / np.outer(scale, scale)
         return np.asarray(bread @ meat @ bread)
@@ -178,18 +190,19 @@ def fit_band(
     outer: float,
     iterations: int,
     tied: bool = False,
+    unlit: Unlit | None = None,
 ) -> BandFit | None:
     """Fit the pose to bins of `side` x `side` px from `inner` bins inside the outlines to `outer` bins outside.
 
-    `gains` may be empty: then they are measured. With `tied` the axis stays on the RCM. None if too little of the
-    outlines is in the frame or the equations are singular.
+    `gains` may be empty: then they are measured. With `tied` the axis stays on the RCM. `unlit` tells the albedo as
+    far as it shows it. None if too little of the outlines is in the frame or the equations are singular.
     """
     nominal, estimate = start.scene, start
     roll = len(nominal.spotlights) > 1
     pose_size = 6 if roll else 5
     size = pose_size + len(knowns.free)
     used = Knowns(0.0, *list(vars(knowns).values())[1:]) if tied else knowns
-    band = _band(image, estimate, side, inner, outer)
+    band = _band(image, estimate, unlit, side, inner, outer)
     if band is None:
         return None
     sight = look(nominal, band.pixels, side)
@@ -200,21 +213,19 @@ def fit_band(
     for turn in range(iterations):
         light, rows = spotlight_irradiance(sight, estimate, knowns, band.pixels, side, roll=roll)
         if turn == 0:
-            for c, signal in enumerate(band.signal):
-                gain = gains[c] if gains else _first_gain(signal, band.usable[c], irradiance, light, band.strips.offset)
+            for c, shown in enumerate(band.shown):
+                gain = gains[c] if gains else _first_gain(shown, irradiance, light, band.strips.offset)
                 spread = np.array([_LEVEL, _SLOPE_PER_MM * pitch])
                 smallest = np.array([_SMALLEST, _SMALLEST / (inner + outer)])
-                channels.append(
-                    _Channel(
-                        signal, band.usable[c], band.clipped[c], band.strips, noise, side**2, gain, spread, smallest
-                    )
-                )
+                channels.append(_Channel(shown, band.strips, noise, side**2, gain, spread, smallest))
         pr, pj = prior_rows(estimate, nominal, used, pose_size)
         information, gradient = pj.T @ pj, -pj.T @ pr
         parts = []
         for channel in channels:
             channel.evaluate(irradiance, light, rows)
             part = channel.eliminated()
+            part.information[range(size, len(part.gradient)), range(size, len(part.gradient))] += channel.precision
+            part.gradient[size + 2 :] -= channel.precision[2:] * channel.slow
             reduced = _reduction(part.information, size)
             parts.append(part)
             information = information + reduced @ part.information @ reduced.T
@@ -228,7 +239,7 @@ def fit_band(
         estimate = estimate.moved(step, pose_size, knowns.free)
         for channel, part in zip(channels, parts, strict=True):
             own = _solved(part.information[size:, size:], part.gradient[size:] - part.information[size:, :size] @ step)
-            channel.learn(part, np.append(step, np.zeros(2) if own is None else np.clip(own, -1.0, 1.0)))
+            channel.learn(part, np.append(step, np.zeros(len(part.gradient) - size) if own is None else np.clip(own, -1.0, 1.0)))
         length = float(step @ information @ step)
         if length < _DONE_SIGMAS**2 and turn >= 2:
             break
@@ -237,8 +248,7 @@ def fit_band(
 
 def _reduction(information: Array, size: int) -> Array:
     """The rows `[size, P]` that take the last parameters out of normal equations `[P, P]`."""
-    nuisance = information[size:, size:] + 1e-9 * np.diag(np.diag(information)[size:] + 1e-300)
-    return np.concatenate([np.eye(size), -np.linalg.solve(nuisance, information[size:, :size]).T], axis=1)
+    return np.concatenate([np.eye(size), -np.linalg.solve(information[size:, size:], information[size:, :size]).T], axis=1)
 
 
 def _solved(information: Array, gradient: Array) -> Array | None:
@@ -250,7 +260,9 @@ def _solved(information: Array, gradient: Array) -> Array | None:
     return step if np.all(np.isfinite(step)) else None
 
 
-def _band(image: NDArray[np.generic], estimate: Estimate, side: int, inner: float, outer: float) -> _Band | None:
+def _band(
+    image: NDArray[np.generic], estimate: Estimate, unlit: Unlit | None, side: int, inner: float, outer: float
+) -> _Band | None:
     """The bins along the outlines, sorted by their strips; None if too few are in the frame."""
     scene = estimate.scene
     edge = scene.camera.resolution // side
@@ -281,36 +293,23 @@ def _band(image: NDArray[np.generic], estimate: Estimate, side: int, inner: floa
     if np.count_nonzero(keep) < _FEWEST:
         return None
     row, column, pixels, spots, distance = row[keep], column[keep], pixels[keep], spots[keep], distance[keep]
-    cut = image[low[1] * side : high[1] * side, low[0] * side : high[0] * side]
-    signal, clip = linear_light(np.ascontiguousarray(cut), scene)
-    if signal.ndim == 2:
-        signal, clip = signal[..., None], clip[..., None]
-    found: list[list[Array]] = [[], [], []]
-    for c in range(signal.shape[2]):
-        plane, share = np.ascontiguousarray(signal[..., c]), clip[..., c].astype(np.float32)
-        if side > 1:
-            shape = (mask.shape[1], mask.shape[0])
-            plane = np.asarray(cv2.resize(plane, shape, interpolation=cv2.INTER_AREA), np.float32)
-            share = np.asarray(cv2.resize(share, shape, interpolation=cv2.INTER_AREA), np.float32)
-        found[0].append(plane[row, column].astype(float))
-        found[1].append(share[row, column] == 0.0)
-        found[2].append(share[row, column] == 1.0)
+    at = Window(int(low[1]) * side, int(low[0]) * side, mask.shape[0], mask.shape[1], side)
     index = _strip_of(pixels, spots, curves, side, len(scene.spotlights))
     order = np.argsort(index, kind="stable")
     _, first, compact = np.unique(index[order], return_index=True, return_inverse=True)
     spot = spots[order][first]
     turns = tuple(slice(*np.searchsorted(spot, [k, k + 1])) for k in np.unique(spot))
     strips = Strips(compact, distance[order], first, turns)
-    planes = [np.stack(plane)[:, order] for plane in found]
-    return _Band(pixels[order], planes[0], planes[1].astype(bool), planes[2].astype(bool), strips, float(np.mean(seen)))
+    shown = tuple(plane.at(row[order], column[order]) for plane in shown_in(image, scene, at, unlit))
+    return _Band(pixels[order], shown, strips, float(np.mean(seen)))
 
 
 def _strip_of(
     pixels: Array, spots: NDArray[np.intp], curves: list[Array], side: int, spotlights: int
 ) -> NDArray[np.intp]:
-    """Strips of equal angle about each patch's middle, about `_STRIP_BINS` wide on the outline."""
+    """Strips of equal angle about each patch's middle, about `WIDTH` wide on the outline."""
     perimeter = max(float(np.sum(np.linalg.norm(np.diff(c, axis=0, append=c[:1]), axis=1))) for c in curves)
-    per_spot = max(8, int(perimeter / _STRIP_BINS))
+    per_spot = max(8, int(perimeter / WIDTH))
     result = np.zeros(len(pixels), np.intp)
     for k in range(spotlights):
         mine = spots == k
@@ -322,8 +321,9 @@ def _strip_of(
     return result
 
 
-def _first_gain(signal: Array, usable: NDArray[np.bool_], irradiance: Array, light_: Array, offset: Array) -> float:
+def _first_gain(shown: Channel, irradiance: Array, light_: Array, offset: Array) -> float:
     """Log of the spotlights' intensity over the ambient irradiance from the band's two sides."""
+    signal, usable = shown.signal / np.exp(shown.template), shown.usable
     inside, outside = usable & (light_ > 0.0) & (offset < -1.0), usable & (light_ <= 0.0) & (offset > 1.0)
     if np.count_nonzero(inside) < 5 or np.count_nonzero(outside) < 5:
         return math.log(1e3 / max(float(light_.max(initial=0.0)), 1e-9))

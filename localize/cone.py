@@ -15,6 +15,7 @@ from localize.outcome import LocalizationFailure, Outcome
 from localize.prior import Knowns
 from localize.start import Start, believed, find_starts
 from localize.verdict import judged
+from localize.view import Unlit
 from scene.scene import Scene
 
 
@@ -33,9 +34,16 @@ def cone(
     )
 
 
-def edge_outcome(image: NDArray[np.generic], scene: Scene, start: Start, knowns: Knowns, noise: NoiseModel) -> Outcome:
+def edge_outcome(
+    image: NDArray[np.generic],
+    scene: Scene,
+    start: Start,
+    knowns: Knowns,
+    noise: NoiseModel,
+    unlit: Unlit | None = None,
+) -> Outcome:
     """The localization from the edge fit near a start, or why it may not be believed."""
-    fit = fit_edge(image, scene, start, knowns, noise)
+    fit = fit_edge(image, scene, start, knowns, noise, unlit)
     if isinstance(fit, str):
         return LocalizationFailure(fit)
     return judged(

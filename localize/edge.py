@@ -11,7 +11,7 @@ from localize.prior import Estimate, Knowns
 from localize.profile import Profile
 from localize.start import Start
 from localize.verdict import COVERED, UNCERTAIN
-from localize.view import outlines
+from localize.view import Unlit, outlines
 from scene.scene import Scene
 
 #: bins across the patch, bins inside and outside the outline, iterations
@@ -41,7 +41,12 @@ def is_clipped(image: NDArray[np.generic], scene: Scene, start: Start) -> bool:
 
 
 def fit_edge(
-    image: NDArray[np.generic], scene: Scene, start: Start, knowns: Knowns, noise: NoiseModel
+    image: NDArray[np.generic],
+    scene: Scene,
+    start: Start,
+    knowns: Knowns,
+    noise: NoiseModel,
+    unlit: Unlit | None = None,
 ) -> BandFit | str:
     """The band fit, coarse to fine, or why there is none."""
     points = outlines(Estimate.at(start.pose, scene))
@@ -63,7 +68,7 @@ def fit_edge(
     for number, (side, inner, outer, iterations) in enumerate(stages):
         fit = fit_band(
             image, estimate, gains, knowns, noise,
-            side=side, inner=inner, outer=outer, iterations=iterations, tied=number == 0,
+            side=side, inner=inner, outer=outer, iterations=iterations, tied=number == 0, unlit=unlit,
         )  # fmt: skip
         if fit is None:
             return UNCERTAIN if number else COVERED

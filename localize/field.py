@@ -15,7 +15,7 @@ from localize.band import SETTLED_SIGMAS
 from localize.noise import NoiseModel
 from localize.prior import Estimate, Knowns, prior_rows
 from localize.roughness import Roughness
-from localize.view import Channel, Grid, Window, channels, visible
+from localize.view import Channel, Grid, Unlit, Window, shown_in, visible
 
 Array = NDArray[np.float64]
 _MARGIN = 0.15  # of a patch's size, seen around it: where the light ends, and the albedo there
@@ -59,8 +59,7 @@ def fit_field(
     modes: int,
     iterations: int,
     tied: int = 0,
-    reference: NDArray[np.generic] | None = None,
-    frames: float = 1.0,
+    unlit: Unlit | None = None,
 ) -> FieldFit | None:
     """Fit pose, gains and albedo to windows `bins` bins across each patch, from `start`.
 
@@ -79,7 +78,7 @@ def fit_field(
             continue
         grid = Grid(at, estimate, knowns, k)
         basis = Modes.over(at.height, at.width, nominal.camera.pixel_pitch * at.side, modes)
-        for c, plane in enumerate(channels(image, nominal, at, reference, noise, frames)):
+        for c, plane in enumerate(shown_in(image, nominal, at, unlit)):
             pieces.append(_Piece(c, plane, grid, basis, noise))
     if not pieces:
         return None
@@ -92,7 +91,7 @@ def fit_field(
     else:
         gains = np.median(first.reshape(-1, 1 + pieces[-1].channel), axis=0)
         for piece in pieces:
-            piece.field = Field(Roughness(), FUNDUS if reference is None else KNOWN)
+            piece.field = Field(Roughness(), FUNDUS if unlit is None else KNOWN)
     whole = size + len(gains)
     settled, prior, information = False, np.zeros((whole, whole)), np.eye(whole)
     for count in range(iterations):

@@ -18,7 +18,7 @@ from localize.outcome import LocalizationFailure, Outcome
 from localize.prior import Estimate, Knowns
 from localize.start import Start, believed, find_starts
 from localize.verdict import COVERED, UNCERTAIN, judged
-from localize.view import outline
+from localize.view import Unlit, outline
 from scene.scene import Scene
 
 #: bins across the patch, modes a side, iterations, of which tied to the RCM
@@ -41,11 +41,12 @@ def photometric(
     `reference` is the same view in ambient light alone, averaged over `frames` frames; in the image's own pixel values.
     """
     known, sensor = knowns or Knowns(), noise or noise_of(scene)
+    unlit = None if reference is None else Unlit(reference, frames, sensor)
 
     def localized(start: Start) -> Outcome:
         if is_sharp(scene) or is_clipped(image, scene, start):
-            return edge_outcome(image, scene, start, known, sensor)
-        fit = fit_patch(image, scene, start, known, sensor, reference, frames)
+            return edge_outcome(image, scene, start, known, sensor, unlit)
+        fit = fit_patch(image, scene, start, known, sensor, unlit)
         if isinstance(fit, str):
             return LocalizationFailure(fit)
         return judged(
@@ -62,8 +63,7 @@ def fit_patch(
     start: Start,
     knowns: Knowns,
     noise: NoiseModel,
-    reference: NDArray[np.generic] | None,
-    frames: float,
+    unlit: Unlit | None,
 ) -> FieldFit | str:
     """The field fit, coarse to fine, or why there is none."""
     estimate = Estimate.at(start.pose, scene)
@@ -74,7 +74,7 @@ def fit_patch(
         modes = _BINNED_MODES if binned and number + 1 == len(_LEVELS) else plain
         fit = fit_field(
             image, estimate, fit, knowns, noise,
-            bins=bins, modes=modes, iterations=iterations, tied=tied, reference=reference, frames=frames,
+            bins=bins, modes=modes, iterations=iterations, tied=tied, unlit=unlit,
         )  # fmt: skip
         if fit is None:
             return UNCERTAIN if number else COVERED

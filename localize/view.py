@@ -88,50 +88,53 @@ class Channel:
     template: Array  #: log albedo known from elsewhere, 0 if nothing is `[h, w]`
     template_variance: Array  #: of that log albedo
 
+    def at(self, row: NDArray[np.intp], column: NDArray[np.intp]) -> Channel:
+        """The same in some of the bins `[N]`."""
+        return Channel(*(plane[row, column] for plane in vars(self).values()))
 
-def channels(
-    image: NDArray[np.generic],
-    scene: Scene,
-    at: Window,
-    reference: NDArray[np.generic] | None,
-    noise: NoiseModel,
-    frames: float,
-) -> list[Channel]:
-    """The channels of an image `[H, W]` or `[H, W, 3]` in a window.
 
-    `reference` is the same view in ambient light alone, a mean over `frames` frames, in pixel values of the image.
-    """
+@dataclass(frozen=True, eq=False)
+class Unlit:
+    """The same view in ambient light alone: `pixels` `[H, W]` or `[H, W, 3]`, a mean over `frames` frames."""
+
+    pixels: NDArray[np.generic]
+    frames: float
+    noise: NoiseModel
+
+    def log_albedo(self, scene: Scene, at: Window) -> tuple[Array, Array]:
+        """Log albedo of a window's bins and its variance, `[C, h, w]`.
+
+        Smoothed as far as its noise exceeds the retina's own detail.
+        """
+        sight = look(scene, window(at.row, at.column, at.height, at.width, at.side), at.side)
+        irradiance = np.maximum(ambient_irradiance(sight, scene).reshape(at.height, at.width), 1e-3)
+        light_ = linear_light(np.ascontiguousarray(at.cut(self.pixels)), scene)[0]
+        found = []
+        for shown in light_.reshape(*light_.shape[:2], -1).transpose(2, 0, 1):
+            plane = at.binned(np.ascontiguousarray(shown))
+            level = max(float(np.median(plane)), 1e-9)
+            variance = float(self.noise.variance(np.array(level))) / self.frames / at.side**2 / level**2
+            width = float(np.clip(0.5 * (variance / 1e-4) ** 0.25, 0.0, 2.5))
+            if width > 0.3:
+                plane = np.asarray(cv2.GaussianBlur(plane, (0, 0), width), float)
+                variance /= max(1.0, 4.0 * np.pi * width**2)
+            plane = np.maximum(plane, 0.1 * level)
+            found.append((np.log(plane / irradiance), variance * (level / plane) ** 2))
+        return np.stack([f[0] for f in found]), np.stack([f[1] for f in found])
+
+
+def shown_in(image: NDArray[np.generic], scene: Scene, at: Window, unlit: Unlit | None) -> list[Channel]:
+    """The channels of an image `[H, W]` or `[H, W, 3]` in a window."""
     light_, clip = linear_light(np.ascontiguousarray(at.cut(image)), scene)
-    signal = light_[..., None] if light_.ndim == 2 else light_
-    clip = clip[..., None] if clip.ndim == 2 else clip
+    signal, clip = light_.reshape(*light_.shape[:2], -1), clip.reshape(*light_.shape[:2], -1)
+    nothing = np.zeros((signal.shape[2], at.height, at.width))
+    template, spread = (nothing, nothing) if unlit is None else unlit.log_albedo(scene, at)
     found = []
-    irradiance: Array | None = None
     for c in range(signal.shape[2]):
-        share = at.binned(clip[..., c].astype(np.float32)) if clip[..., c].any() else np.zeros((at.height, at.width))
-        template, spread = np.zeros((at.height, at.width)), np.zeros((at.height, at.width))
-        if reference is not None:
-            if irradiance is None:
-                sight = look(scene, window(at.row, at.column, at.height, at.width, at.side), at.side)
-                irradiance = ambient_irradiance(sight, scene).reshape(at.height, at.width)
-            cut = linear_light(np.ascontiguousarray(at.cut(reference)), scene)[0]
-            plane = at.binned(np.ascontiguousarray(cut if cut.ndim == 2 else cut[..., c], dtype=np.float32))
-            template, spread = _log_albedo(plane, irradiance, noise, frames * at.side**2)
-        found.append(
-            Channel(at.binned(np.ascontiguousarray(signal[..., c])), share == 0.0, share == 1.0, template, spread)
-        )
+        share = at.binned(clip[..., c].astype(np.float32)) if clip[..., c].any() else nothing[c]
+        plane = at.binned(np.ascontiguousarray(signal[..., c]))
+        found.append(Channel(plane, share == 0.0, share == 1.0, template[c], spread[c]))
     return found
-
-
-def _log_albedo(plane: Array, irradiance: Array, noise: NoiseModel, samples: float) -> tuple[Array, Array]:
-    """Log albedo and its variance from ambient light, smoothed as far as its noise exceeds the retina's own detail."""
-    level = max(float(np.median(plane)), 1e-9)
-    variance = float(noise.variance(np.array(level))) / samples / level**2
-    width = float(np.clip(0.5 * (variance / 1e-4) ** 0.25, 0.0, 2.5))
-    if width > 0.3:
-        plane = np.asarray(cv2.GaussianBlur(plane, (0, 0), width), float)
-        variance /= max(1.0, 4.0 * np.pi * width**2)
-    plane = np.maximum(plane, 0.1 * level)
-    return np.log(plane / np.maximum(irradiance, 1e-3)), variance * (level / plane) ** 2
 
 
 class Grid:
