@@ -91,7 +91,9 @@ class _Channel:
         self.weights = use / variance * student_weights(whitened)
         self.misfit = float(np.sqrt(np.mean(np.minimum(np.square(whitened[use]), 25.0)))) if use.any() else math.inf
         share = g / incident
-        self.jacobian = np.concatenate([share * rows, (share * light)[None], np.ones((1, len(model))), self.strips.slow])
+        self.jacobian = np.concatenate(
+            [share * rows, (share * light)[None], np.ones((1, len(model))), self.strips.slow]
+        )
         self.residual = residual
         # a robust fit follows its data by the slope of their influence, where least squares goes by the weight
         effect = self.weights * np.square(self.jacobian[len(rows)])
@@ -239,7 +241,9 @@ def fit_band(
         estimate = estimate.moved(step, pose_size, knowns.free)
         for channel, part in zip(channels, parts, strict=True):
             own = _solved(part.information[size:, size:], part.gradient[size:] - part.information[size:, :size] @ step)
-            channel.learn(part, np.append(step, np.zeros(len(part.gradient) - size) if own is None else np.clip(own, -1.0, 1.0)))
+            channel.learn(
+                part, np.append(step, np.zeros(len(part.gradient) - size) if own is None else np.clip(own, -1.0, 1.0))
+            )
         length = float(step @ information @ step)
         if length < _DONE_SIGMAS**2 and turn >= 2:
             break
@@ -248,7 +252,9 @@ def fit_band(
 
 def _reduction(information: Array, size: int) -> Array:
     """The rows `[size, P]` that take the last parameters out of normal equations `[P, P]`."""
-    return np.concatenate([np.eye(size), -np.linalg.solve(information[size:, size:], information[size:, :size]).T], axis=1)
+    return np.concatenate(
+        [np.eye(size), -np.linalg.solve(information[size:, size:], information[size:, :size]).T], axis=1
+    )
 
 
 def _solved(information: Array, gradient: Array) -> Array | None:

@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
+WIDTH = 2.0  # of a strip along the outline [bins]
 #: harmonics of the outline that the pose changes: what a fit leaves of them says nothing of what they were
 _FITTED = 3
 _KNEES = np.array([1.0, 2.0, 4.0, 8.0, 16.0, 32.0])  # harmonics above which neighbouring strips err independently
@@ -30,6 +32,28 @@ class Strips:
     def sums(self, values: Array) -> Array:
         """Sums over the strips `[..., S]` of values of the bins `[..., N]`."""
         return np.asarray(np.add.reduceat(values, self.first, axis=-1))
+
+    @cached_property
+    def slow(self) -> Array:
+        """Slopes that vary with harmonics 0 to 2 around each outline, as albedo at each bin `[5 T, N]`: the pose's."""
+        waves = np.zeros((5 * len(self.turns), self.count))
+        for number, turn in enumerate(self.turns):
+            angle = np.arange(turn.stop - turn.start) * (2.0 * np.pi / (turn.stop - turn.start))
+            waves[5 * number, turn] = 1.0
+            for m in (1, 2):
+                waves[5 * number + 2 * m - 1, turn] = np.cos(m * angle)
+                waves[5 * number + 2 * m, turn] = np.sin(m * angle)
+        return np.asarray(waves[:, self.index] * self.offset)
+
+    def slow_gradient(self, levels: Array) -> float:
+        """Rms by which levels `[S]` of width `WIDTH` change slowly along the outlines, of one wave [1/bin]."""
+        found = []
+        for turn in self.turns:
+            count = turn.stop - turn.start
+            waves = np.abs(np.fft.rfft(levels[turn]))[1:4] * (2.0 / count)
+            rise = waves * np.arange(1, len(waves) + 1) * (2.0 * np.pi / (count * WIDTH))
+            found.append(float(np.mean(np.square(rise)) / 2.0))
+        return float(np.sqrt(np.mean(found)))
 
     def log_albedo(self, levels: Array) -> Array:
         """Level plus slope `[S, 2]` at each bin `[N]`."""
