@@ -53,13 +53,17 @@ class Rays:
         return self.middle + (1.0 + shift)[:, None] * (self.ends - self.middle), worth
 
 
-def support(seen: Sequence[Rays]) -> float:
-    """Mean share of the gradients that the outlines as they are explain, 0 to 1; a ray that sees another counts 0."""
+def support(seen: Sequence[Rays]) -> tuple[float, float]:
+    """What the outlines as they are explain: the mean share of a ray's gradients, 0 to 1, and their mean sum.
+
+    A ray that sees another outline counts 0. The sum is what a ray adds to the log-likelihood.
+    """
     middle = len(SHIFTS) // 2
     total = np.concatenate([rays.total for rays in seen])
     left = np.concatenate([rays.left for rays in seen])
     here = np.abs(np.argmin(left, axis=1) - middle) <= 1
-    return float(np.mean(here * np.clip(1.0 - left[:, middle] / np.maximum(total, 1e-6), 0.0, 1.0)))
+    explained = here * np.maximum(total - left[:, middle], 0.0)
+    return float(np.mean(explained / np.maximum(total, 1e-6))), float(np.mean(explained))
 
 
 def rays_across(overview: Overview, scene: Scene, pose: Pose, *, thorough: bool = False) -> list[Rays]:
@@ -67,16 +71,17 @@ def rays_across(overview: Overview, scene: Scene, pose: Pose, *, thorough: bool 
 
     `thorough` doubts the contrast between what lies inside and outside the outline.
     """
-    curves = (scene.camera.project(scene.outline(pose, k, _RAYS)) for k in range(len(scene.spotlights)))
+    curves = [scene.camera.project(scene.outline(pose, k, _RAYS)) for k in range(len(scene.spotlights))]
     found = [
-        _across(overview, scene.beam, curve, k, thorough)
+        _across(overview, scene.beam, curves, k, thorough)
         for k, curve in enumerate(curves)
         if np.all(np.isfinite(curve))
     ]
     return [rays for rays in found if rays is not None]
 
 
-def _across(overview: Overview, beam: Beam, curve: Array, spotlight: int, thorough: bool) -> Rays | None:
+def _across(overview: Overview, beam: Beam, curves: Sequence[Array], spotlight: int, thorough: bool) -> Rays | None:
+    curve = curves[spotlight]
     last = overview.light.shape[0] - 1.0
     bins = curve / overview.step - 0.5
     middle = bins.mean(axis=0)
@@ -98,13 +103,30 @@ def _across(overview: Overview, beam: Beam, curve: Array, spotlight: int, thorou
     ceiling = (1.0 + overview.floor) / math.exp(outside) if clipped else math.inf
     kept = valid[:, 1:].astype(float)
     steps = np.diff(log, axis=1) * kept
+    blurred = np.convolve(profile, kernel, "same")
+    others = [_within(at, other / overview.step - 0.5, blurred) for k, other in enumerate(curves) if k != spotlight]
     tried = []
     for factor in _CLIPPED if clipped else _WIDE if thorough else _PLAIN:
         bright = np.convolve(np.minimum(1.0 + factor * contrast * profile, ceiling), kernel, "same")
-        model = np.diff(np.interp(_ALONG / (1.0 + SHIFTS[:, None]), _FRACTIONS, np.log(bright)), axis=1)
-        tried.append(np.abs(steps[:, None, :] - model * kept[:, None, :]).sum(axis=2))
+        model = np.interp(_ALONG / (1.0 + SHIFTS[:, None]), _FRACTIONS, bright)[None]
+        if others:
+            model = np.minimum(model + factor * contrast * np.sum(others, axis=0)[:, None], ceiling)
+        tried.append(np.abs(steps[:, None] - np.diff(np.log(model), axis=2) * kept[:, None]).sum(axis=2))
     left = min(tried, key=lambda sums: float(sums.min(axis=1).sum()))
     return Rays(spotlight, (middle + 0.5) * overview.step, curve[use], left, np.abs(steps).sum(axis=1))
+
+
+def _within(at: Array, curve: Array, profile: Array) -> Array:
+    """The light `[...]` of another spotlight at points `[..., 2]`, from where they lie within its outline."""
+    middle = curve.mean(axis=0)
+    if not np.all(np.isfinite(middle)):
+        return np.zeros(at.shape[:-1])
+    edge, off = curve - middle, at - middle
+    angle = np.arctan2(edge[:, 1], edge[:, 0])
+    radius = np.interp(
+        np.arctan2(off[..., 1], off[..., 0]), np.sort(angle), np.hypot(*edge.T)[np.argsort(angle)], period=2.0 * math.pi
+    )
+    return np.interp(np.hypot(off[..., 0], off[..., 1]) / radius, _FRACTIONS, profile)
 
 
 def _sampled(plane: Plane, at: Array, blur: float) -> Plane:

@@ -23,7 +23,8 @@ from scene.scene import Scene
 Array = NDArray[np.float64]
 Plane = NDArray[np.float32]
 _OVERVIEW_PX = 500  # about this many pixels a side are looked at
-_SHRINK = 4  # overview pixels a side of a bin of the vote
+_SHRINK, _FINE = 4, 2  # overview pixels a side of a bin of the vote
+_FINE_BINS = 8.0  # largest radius that needs fine bins
 _BLUR_BINS = 0.7
 _FULL_VOTE = 0.12  # gradient of the log light a bin that has half a vote
 _RATIO = 1.2  # of neighbouring radii
@@ -71,23 +72,30 @@ class Ring:
         return np.asarray(self.centre + self.radius * np.stack([np.cos(angle), np.sin(angle)], axis=1))
 
 
-def find_rings(overview: Overview, scene: Scene, most: int, hidden: Sequence[Array] = ()) -> list[Ring]:
-    """The `most` rings with the most votes, best first; gradients along `hidden` curves `[N, 2]` [px] do not vote."""
-    n = overview.light.shape[0] // _SHRINK
-    small = [
+def find_rings(
+    overview: Overview, scene: Scene, most: int, hidden: Sequence[Array] = (), *, small: bool = False
+) -> list[Ring]:
+    """The `most` rings with the most votes, best first; gradients along `hidden` curves `[N, 2]` [px] do not vote.
+
+    `small` rings need finer bins, which take longer.
+    """
+    shrink = _FINE if small else _SHRINK
+    n = overview.light.shape[0] // shrink
+    planes = [
         None if plane is None else np.asarray(cv2.resize(plane, (n, n), interpolation=cv2.INTER_AREA), np.float32)
         for plane in (overview.light, overview.reference)
     ]
-    assert small[0] is not None
-    log = np.asarray(cv2.GaussianBlur(overview.logarithm(small[0], small[1]), (0, 0), _BLUR_BINS), np.float32)
+    assert planes[0] is not None
+    log = np.asarray(cv2.GaussianBlur(overview.logarithm(planes[0], planes[1]), (0, 0), _BLUR_BINS), np.float32)
     gx, gy = (cv2.Scharr(log, cv2.CV_32F, dx, 1 - dx, scale=1.0 / 32.0) for dx in (1, 0))
     vote = 1.0 / (np.sqrt(gx * gx + gy * gy) + np.float32(_FULL_VOTE))
-    scale = overview.step * _SHRINK
+    scale = overview.step * shrink
     for curve in hidden:
         points = np.round(curve / scale - 0.5).astype(np.int32)
         vote = np.asarray(cv2.polylines(vote, [points], True, 0.0, _HIDDEN_BINS), np.float32)
     reach = math.tan(scene.beam.half_angle) / (scene.camera.pixel_pitch * scale)  # bins of radius a mm of distance
     low, high = max(1.2, 0.7 * reach), max(2.4, reach * scene.eye.radius)
+    high = max(2.0 * low, _FINE_BINS) if small else high
     radii = tuple(np.geomspace(low, high, max(3, round(math.log(high / low, _RATIO)) + 1)).tolist())
     size = int(fft.next_fast_len(n + math.ceil(high) + 2, real=True))
     field = fft.rfft2(np.stack([gx * vote, gy * vote]), s=(size, size))

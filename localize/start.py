@@ -20,6 +20,7 @@ from localize.outcome import Localization, LocalizationFailure, Outcome
 from localize.outline import distances
 from localize.prior import Estimate
 from localize.rays import rays_across, support
+from localize.rig import poses_on
 from localize.rings import Overview, Ring, find_rings
 from scene.pose import Pose
 from scene.scene import Scene
@@ -34,14 +35,15 @@ _RINGS = 6
 _TURNS = 4  # steps from a ring's pose to that of the outline the rays see
 _FEWEST_RAYS = 8
 _LEAST_WORTH = 0.2  # share of a ray's gradients that says where the outline is
-#: share of the gradients that a patch explains where nothing else is bright; a disc explains a fifth
-CONVINCING = 0.5
-_LEAST = 0.1
-_COMPARABLE = 0.6  # share of what the best pose explains with which another is tried after it
+#: share of the gradients that a patch explains where nothing else is bright; a disc may explain nearly as much
+CONVINCING = 0.6
+_LEAST = 0.25
+#: share of the best pose's evidence with which another one may be right: after a convincing one, and otherwise
+#: where the two touch, so that each hides part of the other's outline, or lie apart
+_AS_GOOD, _TOUCHING, _APART = 0.8, 0.25, 0.5
+_FITTED = 3
 _RIVAL = 0.85  # share of the best ring's votes with which another may be the patch
 _APART_MM = 0.1  # between poses that count as two
-_ROLLS = 36
-_MATCHED = 0.8  # of a patch's radius: how far its ring may be from where the rig puts it
 
 
 @dataclass(frozen=True)
@@ -50,17 +52,29 @@ class Start:
 
     pose: Pose
     explained: float  #: share of the log light's gradients across the outlines that the cones explain, 0 to 1
+    evidence: float  #: their sum along a ray, what it adds to the log-likelihood
 
     def near(self, pose: Pose, scene: Scene) -> bool:
         """Whether the outlines of `pose` are where the start found them, as well as a start can tell."""
-        for k in range(len(scene.spotlights)):
-            mine, other = (scene.camera.project(scene.outline(p, k, 24)) for p in (self.pose, pose))
-            size = float(np.mean(np.linalg.norm(mine - mine.mean(axis=0), axis=1)))
-            shift = np.linalg.norm(mine.mean(axis=0) - other.mean(axis=0))
-            growth = float(np.mean(np.linalg.norm(other - other.mean(axis=0), axis=1))) - size
-            if not shift + abs(growth) < _NEAR * size:
-                return False
-        return True
+        return all(
+            float(np.linalg.norm(mine[0] - other[0])) + abs(mine[1] - other[1]) < _NEAR * mine[1]
+            for mine, other in zip(_circles(self.pose, scene), _circles(pose, scene), strict=True)
+        )
+
+    def touches(self, other: Start, scene: Scene) -> bool:
+        """Whether a patch of this start touches one of another's."""
+        return any(
+            float(np.linalg.norm(mine[0] - its[0])) < mine[1] + its[1]
+            for mine in _circles(self.pose, scene)
+            for its in _circles(other.pose, scene)
+        )
+
+
+def _circles(pose: Pose, scene: Scene) -> list[tuple[Array, float]]:
+    """Middle `[2]` and mean radius of each outline [px]."""
+    outlines = (scene.camera.project(scene.outline(pose, k, 24)) for k in range(len(scene.spotlights)))
+    middles = ((outline, outline.mean(axis=0)) for outline in outlines)
+    return [(middle, float(np.mean(np.linalg.norm(outline - middle, axis=1)))) for outline, middle in middles]
 
 
 def find_start(image: NDArray[np.generic], scene: Scene, reference: NDArray[np.generic] | None = None) -> Start | str:
@@ -73,15 +87,20 @@ def find_starts(
 ) -> Iterator[Start]:
     """Distinct first poses from an image `[H, W]` or `[H, W, 3]`, the one that explains it best first."""
     overview = Overview.of(image, scene, reference)
-    rings = find_rings(overview, scene, _RINGS)
-    found = _settled(overview, scene, [ring for ring in rings if _rivals(ring, rings[0])], [])
+    most = _RINGS if len(scene.spotlights) == 1 else _RINGS + 2 * len(scene.spotlights)
+    rings = find_rings(overview, scene, most)
+    first = [ring for ring in rings if _rivals(ring, rings[0])] if len(scene.spotlights) == 1 else rings
+    found = _settled(overview, scene, first, [])
     if not found or found[0].explained <= CONVINCING:
         # a patch that touches something brighter: what was found is taken out of the vote
         hidden = [rings[0].curve(), *(_outlines(start.pose, scene) for start in found[:1])]
-        more = [ring for curve in hidden for ring in find_rings(overview, scene, _RINGS, [curve])]
+        more = [ring for curve in hidden for ring in find_rings(overview, scene, most, [curve])]
+        more += find_rings(overview, scene, most, small=True)
         found = _settled(overview, scene, [*rings, *more], found, thorough=True)
-    best = found[0].explained if found else 0.0
-    yield from (start for start in found[:3] if start.explained > max(_LEAST, _COMPARABLE * best))
+    for start in found[:_FITTED]:
+        share = _AS_GOOD if found[0].explained > CONVINCING else _TOUCHING if start.touches(found[0], scene) else _APART
+        if start.explained > _LEAST and start.evidence >= share * found[0].evidence:
+            yield start
 
 
 def believed(starts: Iterable[Start], scene: Scene, localized: Callable[[Start], Outcome]) -> Outcome:
@@ -98,6 +117,8 @@ def believed(starts: Iterable[Start], scene: Scene, localized: Callable[[Start],
                 found = outcome if found is None else found
                 continue
             outcome = LocalizationFailure(ELSEWHERE)
+        if found is None and refusal is None and start.explained > CONVINCING:
+            return outcome
         refusal = outcome if refusal is None else refusal
     if found is not None:
         return found
@@ -117,11 +138,11 @@ def _settled(
     overview: Overview, scene: Scene, rings: Sequence[Ring], before: Sequence[Start], *, thorough: bool = False
 ) -> list[Start]:
     """The poses that rings lead to, and those found before, without repetition, the best first."""
-    poses = _single_poses(rings, scene) if len(scene.spotlights) == 1 else _rig_poses(rings, scene)
+    poses = poses_on(rings, scene)
     settled = (_settle(overview, scene, pose, thorough=thorough) for pose in poses)
     found = [*before, *(start for start in settled if start is not None)]
     distinct: list[Start] = []
-    for start in sorted(found, key=lambda s: -s.explained):
+    for start in sorted(found, key=lambda s: -s.evidence):
         if all(_differ(start.pose, other.pose) for other in distinct):
             distinct.append(start)
     return distinct
@@ -142,7 +163,7 @@ def _settle(overview: Overview, scene: Scene, pose: Pose, *, thorough: bool) -> 
         if not seen:
             return None
         if turn == _TURNS:
-            return Start(estimate.pose, support(seen))
+            return Start(estimate.pose, *support(seen))
         points, worth = zip(*(rays.found() for rays in seen), strict=True)
         spots = np.concatenate([np.full(len(r.total), r.spotlight, np.intp) for r in seen])
         sizes = np.concatenate([np.linalg.norm(r.ends - r.middle, axis=1) for r in seen])
@@ -182,75 +203,6 @@ def _towards(estimate: Estimate, pixels: Array, spots: NDArray[np.intp], worth: 
         return Estimate.at(through, scene)
     turned = moved(pose, np.array([*step[:3], u @ step[:3] / length, v @ step[:3] / length, step[3]]))
     return Estimate.at(Pose(tip, through.axis, turned.roll), scene)
-
-
-def _single_poses(rings: Sequence[Ring], scene: Scene) -> list[Pose]:
-    """The poses through the RCM that put one patch on each ring."""
-    found = (_on(ring, np.zeros(1), 0, scene) for ring in rings)
-    return [pose for poses in found for pose in poses]
-
-
-def _rig_poses(rings: Sequence[Ring], scene: Scene) -> list[Pose]:
-    """The poses through the RCM that put the rig's patches on most rings: one for each roll that may be."""
-    number = len(scene.spotlights)
-    ranked = []
-    for ring in rings[:2]:
-        for k in range(number):
-            for pose in _on(ring, np.arange(_ROLLS) * (2.0 * math.pi / _ROLLS), k, scene):
-                ranked.append(_matched(pose, rings, ring.radius, scene))
-    ranked = sorted((m for m in ranked if np.count_nonzero(m[2] >= 0) > 1), key=lambda m: m[0])
-    found: list[Pose] = []
-    for _, pose, partner in ranked:
-        if len(found) < number and all(_turned(pose, other) > 0.6 for other in found):
-            estimate: Estimate | None = Estimate.at(pose, scene)
-            pairs = [(rings[j].curve(), k) for k, j in enumerate(partner) if j >= 0]
-            spots = np.repeat([k for _, k in pairs], len(pairs[0][0]))
-            pixels = np.concatenate([curve for curve, _ in pairs])
-            for _ in range(3):
-                if estimate is not None:
-                    estimate = _towards(estimate, pixels, spots, np.ones(len(pixels)), np.full(len(pixels), 10.0))
-            if estimate is not None:
-                found.append(estimate.pose)
-    return found
-
-
-def _turned(a: Pose, b: Pose) -> float:
-    return abs(math.remainder(a.roll - b.roll, 2.0 * math.pi))
-
-
-def _on(ring: Ring, rolls: NDArray[np.floating], spotlight: int, scene: Scene) -> list[Pose]:
-    """Poses through the RCM with each of `rolls` whose cone `spotlight` meets the wall in the ring."""
-    edge = look(scene, ring.curve()).points
-    rcm = np.asarray(scene.instrument.rcm)
-    if not np.all(np.isfinite(edge)):
-        return []
-    wall = edge.mean(axis=0)
-    line = (wall - rcm) / np.linalg.norm(wall - rcm)
-    off = edge - wall
-    off = off - (off @ line)[:, None] * line
-    longest = 0.95 * float(np.linalg.norm(wall - rcm))
-    away = min(longest, float(np.mean(np.linalg.norm(off, axis=1))) / math.tan(scene.beam.half_angle))
-    found = []
-    for roll in rolls:
-        axis = line
-        for _ in range(2):
-            pose = Pose.through(wall - away * axis, rcm)
-            axis = spotlight_axes(Pose(pose.apex, pose.axis, float(roll)), scene.spotlights)[spotlight]
-        if scene.depth(pose.apex) > 0.0:
-            found.append(Pose(pose.apex, pose.axis, float(roll)))
-    return found
-
-
-def _matched(pose: Pose, rings: Sequence[Ring], radius: float, scene: Scene) -> tuple[float, Pose, NDArray[np.intp]]:
-    """How far the patches are from the nearest rings, in radii, the pose, and the rings; -1 where none is near."""
-    axes = spotlight_axes(pose, scene.spotlights)
-    wall = pose.apex + scene.eye.intersect(pose.apex, axes)[:, None] * axes
-    off = scene.camera.project(wall)[:, None] - np.array([ring.centre for ring in rings])
-    size = np.abs(np.log(np.array([ring.radius for ring in rings]) / radius))
-    distance = np.linalg.norm(off, axis=2) / radius + size
-    nearest = np.argmin(distance, axis=1)
-    far = np.minimum(distance.min(axis=1), _MATCHED)
-    return float(far.sum()), pose, np.where(far < _MATCHED, nearest, -1)
 
 
 def nearest_outline(pixels: Array, estimate: Estimate) -> tuple[NDArray[np.intp], NDArray[np.bool_]]:
