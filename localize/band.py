@@ -11,36 +11,25 @@ import math
 from dataclasses import dataclass, field
 from functools import cached_property
 
-import cv2
 import numpy as np
 from numpy.typing import NDArray
 
 from localize.forward import ambient_irradiance, look
 from localize.noise import NoiseModel
-from localize.outline import distances
 from localize.prior import Estimate, Knowns, prior_rows
-from localize.solve import rest, student_bend, student_weights
-from localize.start import nearest_outline
-from localize.strips import WIDTH, Eliminated, Strips, score_covariance, strip_scores
-from localize.view import Channel, Unlit, Window, shown_in, spotlight_irradiance
+from localize.ribbon import Ribbon
+from localize.solve import reduction, rest, solved, student_bend, student_weights
+from localize.strips import Eliminated, Strips, score_covariance, strip_scores
+from localize.view import Channel, Unlit, spotlight_irradiance
 
 Array = NDArray[np.float64]
 #: where the spreads of the strips' log albedo start: level, and gradient per mm of a fundus in green light
 _LEVEL, _SLOPE_PER_MM = 0.3, 3.0
 _SMALLEST = 1e-3  # spread of levels, and of slopes over the width of the band
 _LONGEST_STEP_BINS = 3.0
-_FEWEST = 40  # bins
 _DONE_SIGMAS = 0.05  # a step this short ends the iterations
 #: a last step longer than this, in sigmas of the fit, means that the fit does not settle
 SETTLED_SIGMAS = 1.0
-
-
-@dataclass(frozen=True)
-class _Band:
-    pixels: Array  #: centres of the bins `[N, 2]` [px]
-    shown: tuple[Channel, ...]  #: what the bins show, `[N]` each
-    strips: Strips
-    covered: float  #: share of the outlines in the frame
 
 
 @dataclass
@@ -170,7 +159,7 @@ class BandFit:
             gradient, own = channel.scores()
             whole = own.sum(axis=0)
             whole[range(size, len(whole)), range(size, len(whole))] += channel.precision
-            reduced = _reduction(whole, size)
+            reduced = reduction(whole, size)
             known = known + (reduced[:, size:] * channel.precision) @ reduced[:, size:].T
             scores = scores + gradient @ reduced.T / channel.follows
             parts = parts + reduced @ own @ reduced.T
@@ -204,7 +193,7 @@ def fit_band(
     pose_size = 6 if roll else 5
     size = pose_size + len(knowns.free)
     used = Knowns(0.0, *list(vars(knowns).values())[1:]) if tied else knowns
-    band = _band(image, estimate, unlit, side, inner, outer)
+    band = Ribbon.along(image, estimate, side=side, inner=inner, outer=outer, unlit=unlit)
     if band is None:
         return None
     sight = look(nominal, band.pixels, side)
@@ -228,19 +217,19 @@ def fit_band(
             part = channel.eliminated()
             part.information[range(size, len(part.gradient)), range(size, len(part.gradient))] += channel.precision
             part.gradient[size + 2 :] -= channel.precision[2:] * channel.slow
-            reduced = _reduction(part.information, size)
+            reduced = reduction(part.information, size)
             parts.append(part)
             information = information + reduced @ part.information @ reduced.T
             gradient = gradient + reduced @ part.gradient
-        solved = _solved(information, gradient)
-        if solved is None:
+        found = solved(information, gradient)
+        if found is None:
             return None
-        step = solved
+        step = found
         reach = float(np.max(np.abs(step[:3])))
         step = step / max(1.0, reach / max(0.1, _LONGEST_STEP_BINS * pitch), float(np.max(np.abs(step[3:5]))) / 0.05)
         estimate = estimate.moved(step, pose_size, knowns.free)
         for channel, part in zip(channels, parts, strict=True):
-            own = _solved(part.information[size:, size:], part.gradient[size:] - part.information[size:, :size] @ step)
+            own = solved(part.information[size:, size:], part.gradient[size:] - part.information[size:, :size] @ step)
             channel.learn(
                 part, np.append(step, np.zeros(len(part.gradient) - size) if own is None else np.clip(own, -1.0, 1.0))
             )
@@ -248,83 +237,6 @@ def fit_band(
         if length < _DONE_SIGMAS**2 and turn >= 2:
             break
     return BandFit(estimate, information, pj, step, tuple(channels), band.covered)
-
-
-def _reduction(information: Array, size: int) -> Array:
-    """The rows `[size, P]` that take the last parameters out of normal equations `[P, P]`."""
-    return np.concatenate(
-        [np.eye(size), -np.linalg.solve(information[size:, size:], information[size:, :size]).T], axis=1
-    )
-
-
-def _solved(information: Array, gradient: Array) -> Array | None:
-    scale = np.sqrt(np.maximum(np.diag(information), 1e-300))
-    try:
-        step: Array = np.linalg.solve(information / np.outer(scale, scale), gradient / scale) / scale
-    except np.linalg.LinAlgError:
-        return None
-    return step if np.all(np.isfinite(step)) else None
-
-
-def _band(
-    image: NDArray[np.generic], estimate: Estimate, unlit: Unlit | None, side: int, inner: float, outer: float
-) -> _Band | None:
-    """The bins along the outlines, sorted by their strips; None if too few are in the frame."""
-    scene = estimate.scene
-    edge = scene.camera.resolution // side
-    curves, seen = [], []
-    for k in range(len(scene.spotlights)):
-        points = scene.camera.project(scene.outline(estimate.pose, k, 180)) / side - 0.5
-        finite = np.all(np.isfinite(points), axis=1)
-        inside = finite & np.all((points > 1.0) & (points < edge - 2.0), axis=1)
-        seen.append(float(np.mean(inside)))
-        if inside.sum() >= 10:
-            curves.append(points[finite])
-    if not curves:
-        return None
-    reach = math.ceil(max(inner, outer)) + 1
-    every = np.concatenate(curves)
-    low = np.clip(np.floor(every.min(axis=0)).astype(int) - reach, 0, edge - 1)
-    high = np.clip(np.ceil(every.max(axis=0)).astype(int) + reach + 1, 1, edge)
-    if np.any(high - low < 4):
-        return None
-    mask = np.zeros((high[1] - low[1], high[0] - low[0]), np.uint8)
-    for points in curves:
-        cv2.polylines(mask, [np.round(points - low).astype(np.int32)], True, 1, 2 * reach + 1)
-    row, column = np.nonzero(mask)
-    pixels = (np.stack([column + low[0], row + low[1]], axis=1) + 0.5) * side
-    spots, alone = nearest_outline(pixels, estimate)
-    distance = distances(pixels, spots, estimate, roll=len(scene.spotlights) > 1)[0] / side
-    keep = np.isfinite(distance) & alone & (distance > -inner) & (distance < outer)
-    if np.count_nonzero(keep) < _FEWEST:
-        return None
-    row, column, pixels, spots, distance = row[keep], column[keep], pixels[keep], spots[keep], distance[keep]
-    at = Window(int(low[1]) * side, int(low[0]) * side, mask.shape[0], mask.shape[1], side)
-    index = _strip_of(pixels, spots, curves, side, len(scene.spotlights))
-    order = np.argsort(index, kind="stable")
-    _, first, compact = np.unique(index[order], return_index=True, return_inverse=True)
-    spot = spots[order][first]
-    turns = tuple(slice(*np.searchsorted(spot, [k, k + 1])) for k in np.unique(spot))
-    strips = Strips(compact, distance[order], first, turns)
-    shown = tuple(plane.at(row[order], column[order]) for plane in shown_in(image, scene, at, unlit))
-    return _Band(pixels[order], shown, strips, float(np.mean(seen)))
-
-
-def _strip_of(
-    pixels: Array, spots: NDArray[np.intp], curves: list[Array], side: int, spotlights: int
-) -> NDArray[np.intp]:
-    """Strips of equal angle about each patch's middle, about `WIDTH` wide on the outline."""
-    perimeter = max(float(np.sum(np.linalg.norm(np.diff(c, axis=0, append=c[:1]), axis=1))) for c in curves)
-    per_spot = max(8, int(perimeter / WIDTH))
-    result = np.zeros(len(pixels), np.intp)
-    for k in range(spotlights):
-        mine = spots == k
-        if not mine.any():
-            continue
-        middle = 0.5 * (pixels[mine].min(axis=0) + pixels[mine].max(axis=0))
-        angle = np.arctan2(pixels[mine, 1] - middle[1], pixels[mine, 0] - middle[0]) + math.pi
-        result[mine] = k * per_spot + np.minimum((angle * per_spot / (2.0 * math.pi)).astype(np.intp), per_spot - 1)
-    return result
 
 
 def _first_gain(shown: Channel, irradiance: Array, light_: Array, offset: Array) -> float:

@@ -15,8 +15,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from localize.band import BandFit
-from localize.edge import fit_edge
+from localize.edge import EdgeFit, fit_edge
 from localize.forward import tangents
 from localize.noise import NoiseModel, noise_of
 from localize.prior import FREE, Knowns, value, with_value
@@ -190,7 +189,7 @@ def _disagreement(terms: list[tuple[Array, Array]], step: Array, widths: Array) 
     return max(1.0, total / max(told - len(step), 1))
 
 
-def _term(fit: BandFit, scene: Scene, tight: Knowns, width: Width, size: int) -> tuple[Array, Array]:
+def _term(fit: EdgeFit, scene: Scene, tight: Knowns, width: Width, size: int) -> tuple[Array, Array]:
     """A frame's information on the common quantities and its pull on them, its pose eliminated."""
     estimate = fit.estimate
     free = tight.free

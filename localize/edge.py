@@ -9,6 +9,7 @@ from localize.band import BandFit, fit_band
 from localize.noise import NoiseModel, linear_light
 from localize.prior import Estimate, Knowns
 from localize.profile import Profile
+from localize.saturated import SaturatedFit, fit_saturated
 from localize.start import Start
 from localize.verdict import COVERED, UNCERTAIN
 from localize.view import Unlit, outlines
@@ -21,6 +22,11 @@ _CLIPPED = ((40, 8.0, 3.0, 6), (130, 20.0, 4.0, 5))
 #: a sharp edge and a clipped patch's rim end at full resolution: least bins inside, reach inside [mm], bins outside
 _FULL_SHARP = (5.0, 0.025, 5.0)
 _FULL_CLIPPED = (4.0, 0.015, 3.0)
+
+
+_SATURATED = (30, 90)  # bins across a patch that is clipped throughout, before full resolution
+
+EdgeFit = BandFit | SaturatedFit
 
 
 def is_sharp(scene: Scene) -> bool:
@@ -47,22 +53,31 @@ def fit_edge(
     knowns: Knowns,
     noise: NoiseModel,
     unlit: Unlit | None = None,
-) -> BandFit | str:
+) -> EdgeFit | str:
     """The band fit, coarse to fine, or why there is none."""
     points = outlines(Estimate.at(start.pose, scene))
     if len(points) < 10:
         return COVERED
     spotlights = len(scene.spotlights)
     size = float(np.max(np.ptp(points, axis=0))) / (1.0 if spotlights == 1 else 2.0)
-    sharp = is_sharp(scene)
-    full = sharp or is_clipped(image, scene, start)
+    sharp, clipped = is_sharp(scene), is_clipped(image, scene, start)
+    estimate = Estimate.at(start.pose, scene)
+    if sharp and clipped:
+        saturated: SaturatedFit | None = None
+        for number, side in enumerate([side for side in (int(size / bins) for bins in _SATURATED) if side > 1] + [1]):
+            saturated = fit_saturated(image, estimate, knowns, side=side, tied=number == 0)
+            if saturated is None:
+                return UNCERTAIN if number else COVERED
+            estimate = saturated.estimate
+        assert saturated is not None
+        return saturated
+    full = sharp or clipped
     plan = _SOFT if not full else _SHARP if sharp else _CLIPPED
     stages = [(max(1, int(size / bins)), inner, outer, turns) for bins, inner, outer, turns in plan]
     if full:
         least, reach, outside = _FULL_SHARP if sharp else _FULL_CLIPPED
         stages = [stage for stage in stages if stage[0] > 1]
         stages.append((1, max(least, reach / scene.camera.pixel_pitch), outside, 8))
-    estimate = Estimate.at(start.pose, scene)
     gains: tuple[float, ...] = ()
     fit: BandFit | None = None
     for number, (side, inner, outer, iterations) in enumerate(stages):

@@ -42,6 +42,23 @@ def rest(residuals: Array, variances: Array, before: float) -> float:
     return float(np.sqrt(np.clip(found, _REST[0] ** 2, _REST[1] ** 2)))
 
 
+def reduction(information: Array, size: int) -> Array:
+    """The rows `[size, P]` that take the last parameters out of normal equations `[P, P]`."""
+    return np.concatenate(
+        [np.eye(size), -np.linalg.solve(information[size:, size:], information[size:, :size]).T], axis=1
+    )
+
+
+def solved(information: Array, gradient: Array) -> Array | None:
+    """The solution of normal equations, well scaled; None if they have none."""
+    scale = np.sqrt(np.maximum(np.diag(information), 1e-300))
+    try:
+        step: Array = np.linalg.solve(information / np.outer(scale, scale), gradient / scale) / scale
+    except np.linalg.LinAlgError:
+        return None
+    return step if np.all(np.isfinite(step)) else None
+
+
 @dataclass(frozen=True)
 class Solution:
     """A minimum: the estimate, the information matrix there and the whitened residuals of the data."""

@@ -127,7 +127,7 @@ def score_covariance(strips: Strips, scores: Array, parts: Array) -> Array:
     """
     scale = np.sqrt(np.maximum(np.einsum("spp->p", parts), 1e-300))
     values, vectors = np.linalg.eigh(parts / np.outer(scale, scale))
-    values = np.maximum(values, 1e-12 * values.max(axis=0))
+    values = np.maximum(values, 1e-12 * values.max())
     total = np.zeros_like(parts[0])
     for turn in strips.turns:
         for value, direction in zip(values[turn].T, np.moveaxis(vectors[turn], 2, 0), strict=True):
