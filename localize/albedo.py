@@ -23,6 +23,7 @@ _FIRST_OCTAVE, _OCTAVES = -2, 8
 _SHARED = 4.0  # what the next finer octave says of an octave's amplitude, in modes
 #: amplitudes to start from, of a fundus and of what a reference leaves of it
 FUNDUS, KNOWN = np.full(_OCTAVES, 0.0025), np.full(_OCTAVES, 1e-5)
+_MOST, _BINS_A_MODE = 24, 8  # modes a side: a finer wave costs more than it tells
 _MEAN_VARIANCE = 100.0  # of the mean, which nothing restricts
 
 
@@ -38,9 +39,9 @@ class Modes:
     octave: NDArray[np.intp]  #: of each mode's wave number `[ny nx]`
 
     @classmethod
-    def over(cls, height: int, width: int, bin_mm: float, count: int) -> Modes:
-        """At most `count` modes a side over a window of bins of `bin_mm` [mm]."""
-        ny, nx = min(count, height // 2), min(count, width // 2)
+    def over(cls, height: int, width: int, bin_mm: float) -> Modes:
+        """Modes of a window of bins of `bin_mm` [mm]."""
+        ny, nx = (max(2, min(_MOST, side // _BINS_A_MODE)) for side in (height, width))
         twice = [_cosines(2 * n, size) for n, size in ((ny, height), (nx, width))]
         sides = (height * bin_mm, width * bin_mm)
         k = np.hypot(np.arange(ny)[:, None] / (2.0 * sides[0]), np.arange(nx) / (2.0 * sides[1])).ravel()

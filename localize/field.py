@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 
+import cv2
 import numpy as np
 from numpy.typing import NDArray
 
@@ -20,7 +21,7 @@ from localize.view import Channel, Grid, Unlit, Window, shown_in, visible
 Array = NDArray[np.float64]
 _MARGIN = 0.15  # of a patch's size, seen around it: where the light ends, and the albedo there
 _LONGEST_STEP_MM = 0.15
-_DONE_SIGMAS = 0.05
+_DONE_SIGMAS = 0.2  # a step this short ends the iterations
 _TIED_MM = 2e-3
 #: an albedo with vessels and a disc is no Gaussian field: on fundus images, in green and at 850 nm, the squared errors
 #: of the tip were this much larger, with the RCM and without
@@ -28,19 +29,11 @@ _NOT_GAUSSIAN = 1.4
 
 
 @dataclass(frozen=True)
-class Field:
-    """What one channel in one window shows of its albedo."""
-
-    roughness: Roughness
-    amplitudes: Array  #: of the power spectrum, by octave
-
-
-@dataclass(frozen=True)
 class FieldFit:
     """A fitted patch, or several."""
 
     estimate: Estimate
-    fields: tuple[Field, ...]
+    pieces: tuple[_Piece, ...]
     gains: tuple[float, ...]  #: log of the spotlights' intensity over the ambient irradiance, a channel each
     information: Array  #: of the pose and the free quantities `[P, P]`, priors included
     misfit: float  #: rms of the lit bins' residuals, outliers cut, over what the model expects
@@ -56,7 +49,6 @@ def fit_field(
     noise: NoiseModel,
     *,
     bins: int,
-    modes: int,
     iterations: int,
     tied: int = 0,
     unlit: Unlit | None = None,
@@ -77,21 +69,21 @@ def fit_field(
         if at is None:
             continue
         grid = Grid(at, estimate, knowns, k)
-        basis = Modes.over(at.height, at.width, nominal.camera.pixel_pitch * at.side, modes)
+        basis = Modes.over(at.height, at.width, nominal.camera.pixel_pitch * at.side)
         for c, plane in enumerate(shown_in(image, nominal, at, unlit)):
             pieces.append(_Piece(c, plane, grid, basis, noise))
     if not pieces:
         return None
     lights = {id(piece.grid): piece.grid.spotlight(estimate, roll=roll) for piece in pieces}
     first = np.array([piece.begin(lights[id(piece.grid)][0]) for piece in pieces])
-    if before is not None and len(before.fields) == len(pieces):
+    if before is not None and len(before.pieces) == len(pieces):
         gains = np.array(before.gains)
-        for piece, field in zip(pieces, before.fields, strict=True):
-            piece.field = field
+        for piece, coarse in zip(pieces, before.pieces, strict=True):
+            piece.resume(coarse)
     else:
         gains = np.median(first.reshape(-1, 1 + pieces[-1].channel), axis=0)
         for piece in pieces:
-            piece.field = Field(Roughness(), FUNDUS if unlit is None else KNOWN)
+            piece.amplitudes = FUNDUS if unlit is None else KNOWN
     whole = size + len(gains)
     settled, prior, information = False, np.zeros((whole, whole)), np.eye(whole)
     for count in range(iterations):
@@ -124,13 +116,13 @@ def fit_field(
             piece.move(step[mine], covariance[np.ix_(mine, mine)])
         length = float(np.sqrt(max(0.0, float(step @ information @ step))))
         settled = length < SETTLED_SIGMAS
-        if length < _DONE_SIGMAS and count >= max(tied, 2):
+        if length < _DONE_SIGMAS and count >= max(tied, 1):
             break
     own = information[size:, :size]
     data = information[:size, :size] - own.T @ np.linalg.solve(information[size:, size:], own) - prior
     return FieldFit(
         estimate,
-        tuple(piece.field for piece in pieces),
+        tuple(pieces),
         tuple(gains),
         prior + data / _NOT_GAUSSIAN,
         float(np.sqrt(np.mean([piece.misfit**2 for piece in pieces]))),
@@ -142,7 +134,8 @@ def fit_field(
 class _Piece:
     """One channel in one window: its normal equations for pose and gain, with its albedo eliminated."""
 
-    field: Field
+    roughness = Roughness()
+    amplitudes = FUNDUS  # of the albedo's power spectrum, by octave
 
     def __init__(self, channel: int, plane: Channel, grid: Grid, basis: Modes, noise: NoiseModel) -> None:
         self.channel, self.grid = channel, grid
@@ -168,6 +161,21 @@ class _Piece:
         bright = full[lit] >= np.quantile(full[lit], 0.5)
         return float(np.log(max(float(np.median(ratio[bright])), 1e-3 / float(light.max()))))
 
+    def resume(self, coarse: _Piece) -> None:
+        """Take over what a coarser fit knows of the albedo."""
+        self.roughness, self.amplitudes = coarse.roughness, coarse.amplitudes
+        at, old = self.grid.at, coarse.grid.at
+        scale = at.side / old.side
+        shift = [
+            (new - was) / old.side + (scale - 1.0) / 2.0 for new, was in ((at.column, old.column), (at.row, old.row))
+        ]
+        to = np.array([[scale, 0.0, shift[0]], [0.0, scale, shift[1]]])
+        self._albedo[:] = cv2.warpAffine(
+            coarse._albedo, to, (at.width, at.height),
+            flags=cv2.INTER_LINEAR | cv2.WARP_INVERSE_MAP, borderMode=cv2.BORDER_REPLICATE,
+        )  # fmt: skip
+        self._fresh = False
+
     def unclipped(self) -> float:
         """Share of the window's lit bins that can be measured."""
         lit = self._lit & self._seen
@@ -178,7 +186,7 @@ class _Piece:
 
         The grid's bins get `light` `[N]`, with its derivatives `[P, N]`.
         """
-        plane, grid, field = self._plane, self.grid, self.field
+        plane, grid = self._plane, self.grid
         shape, gain = plane.signal.shape, np.exp(log_gain)
         full = self._full(light)
         self._lit = full > 0.0
@@ -192,21 +200,19 @@ class _Piece:
         use = self._usable | bound
         sensor = self._noise.variance(model) / grid.at.side**2 / np.square(np.maximum(model, 1e-9))
         sensor = sensor + plane.template_variance
-        roughness, local = field.roughness, np.full(shape, field.roughness.scatter**2)
+        local = np.full(shape, self.roughness.scatter**2)
         if not self._fresh:
             inner = self._usable & (full > 0.1 * light.max(initial=0.0))
-            roughness, local = roughness.measured(residual, sensor, use, inner)
+            self.roughness, local = self.roughness.measured(residual, sensor, use, inner)
         whitened = np.square(residual[use]) / (sensor + local)[use]
         self.misfit = float(np.sqrt(np.mean(np.minimum(whitened, 25.0)))) if use.any() else np.inf
         jacobian = np.zeros((len(rows) + 1, full.size))
         share = gain / brightness.ravel()[grid.lit]
         jacobian[:-1, grid.lit] = share * rows
         jacobian[-1, grid.lit] = share * light
-        weights = use / (sensor + roughness.variance(local))
-        solved = eliminate(
-            self._basis, weights, jacobian.reshape(-1, *shape), residual + self._albedo, field.amplitudes
-        )
-        self._solved, self.field = solved, Field(roughness, field.amplitudes)
+        weights = use / (sensor + self.roughness.variance(local))
+        solved = eliminate(self._basis, weights, jacobian.reshape(-1, *shape), residual + self._albedo, self.amplitudes)
+        self._solved = solved
         return solved.information, solved.gradient
 
     def move(self, step: Array, covariance: Array) -> None:
@@ -217,8 +223,7 @@ class _Piece:
         solved = self._solved
         coefficients = solved.coefficients(step)
         variances = solved.variances + np.einsum("ij,jk,ik->i", solved.gain, covariance, solved.gain)
-        amplitudes = self._basis.learnt(coefficients, variances, self.field.amplitudes)
-        self.field = Field(self.field.roughness, amplitudes)
+        self.amplitudes = self._basis.learnt(coefficients, variances, self.amplitudes)
         self._albedo, self._fresh = self._basis.field(coefficients), False
 
     def _full(self, light: Array) -> Array:

@@ -18,13 +18,11 @@ from localize.outcome import LocalizationFailure, Outcome
 from localize.prior import Estimate, Knowns
 from localize.start import Start, believed, find_starts
 from localize.verdict import COVERED, UNCERTAIN, judged
-from localize.view import Unlit, outline
+from localize.view import Unlit
 from scene.scene import Scene
 
-#: bins across the patch, modes a side, iterations, of which tied to the RCM
-_LEVELS = ((64, 10, 7, 3), (130, 16, 8, 0))
-#: modes of the last level where pixels are binned: their noise no longer hides the retina's finer detail
-_BINNED_MODES = 25
+#: bins across a patch, at most; iterations, of which tied to the RCM
+_LEVELS = ((48, 5, 2), (240, 8, 0))
 
 
 def photometric(
@@ -68,14 +66,8 @@ def fit_patch(
     """The field fit, coarse to fine, or why there is none."""
     estimate = Estimate.at(start.pose, scene)
     fit: FieldFit | None = None
-    points = outline(estimate, 0)
-    binned = len(points) > 0 and float(np.max(np.ptp(points, axis=0))) >= 2.0 * _LEVELS[-1][0]
-    for number, (bins, plain, iterations, tied) in enumerate(_LEVELS):
-        modes = _BINNED_MODES if binned and number + 1 == len(_LEVELS) else plain
-        fit = fit_field(
-            image, estimate, fit, knowns, noise,
-            bins=bins, modes=modes, iterations=iterations, tied=tied, unlit=unlit,
-        )  # fmt: skip
+    for number, (bins, iterations, tied) in enumerate(_LEVELS):
+        fit = fit_field(image, estimate, fit, knowns, noise, bins=bins, iterations=iterations, tied=tied, unlit=unlit)
         if fit is None:
             return UNCERTAIN if number else COVERED
         estimate = fit.estimate

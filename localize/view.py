@@ -31,13 +31,13 @@ class Window:
 
     @classmethod
     def around(cls, estimate: Estimate, spotlight: int, bins: int, margin: float) -> Window | None:
-        """A spotlight's outline with `margin` times its size around, `bins` bins across; None if out of the frame."""
+        """A spotlight's outline with `margin` times its size around, at most `bins` bins across; None if outside."""
         points, scene = outline(estimate, spotlight), estimate.scene
         if not len(points):
             return None
         low, high = points.min(axis=0), points.max(axis=0)
         size = float(np.max(high - low))
-        side = max(1, int(size / bins))
+        side = max(1, int(np.ceil(size / bins)))
         edge = scene.camera.resolution // side
         low = np.clip(np.floor((low - margin * size) / side), 0, edge).astype(int)
         high = np.clip(np.ceil((high + margin * size) / side), 0, edge).astype(int)
