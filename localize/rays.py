@@ -26,6 +26,7 @@ _NEEDED = len(_ALONG) - 4  # samples of a ray that must be in the frame
 SHIFTS = 0.03 * np.arange(-8, 9)  #: of the outline that are tried
 _FRACTIONS = np.linspace(0.0, 2.5, 501)  # of the half angle
 _WHITE = 0.97
+_WIDEST = 0.25  # blur of the profile
 #: contrasts that are tried, over the one measured: of a clipped patch only the rim is seen, and where other things
 #: are bright what lies inside and outside the outline says little
 _PLAIN, _CLIPPED, _WIDE = (1.0,), (1.0, 4.0, 16.0, 64.0), (0.06, 0.12, 0.25, 0.5, 1.0, 2.0)
@@ -97,7 +98,7 @@ def _across(overview: Overview, beam: Beam, curves: Sequence[Array], spotlight: 
     ground = None if overview.reference is None else _sampled(overview.reference, at, blur)
     log = overview.logarithm(light, ground).astype(float)
     inside, outside = (float(np.median(log[:, part])) for part in (_INSIDE, _OUTSIDE))
-    profile, kernel = _profile(beam), _kernel(round(math.hypot(blur, 0.4) / size, 2))
+    profile, kernel = _profile(beam), _kernel(round(min(_WIDEST, math.hypot(blur, 0.4) / size), 2))
     contrast = math.expm1(max(0.05, inside - outside)) / max(0.02, float(np.interp(0.6, _FRACTIONS, profile)))
     clipped = float(np.mean(light[:, _INSIDE] > _WHITE)) > 0.3
     ceiling = (1.0 + overview.floor) / math.exp(outside) if clipped else math.inf

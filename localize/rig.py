@@ -16,6 +16,7 @@ from scene.spotlights import spotlight_axes
 
 Array = NDArray[np.float64]
 _ROLLS = 36
+_TURNED = 0.6  # between rolls that count as two [rad]
 _MATCHED = 0.8  # of a patch's radius: how far its ring may be from where the rig puts it
 
 
@@ -39,27 +40,29 @@ def poses_on(rings: Sequence[Ring], scene: Scene) -> list[Pose]:
         apex = middles[ring] - reach * axis
         frame = _frames(apex - rcm)
         axis = np.einsum("hij,hj->hi", frame, rig[roll, spot])
-    inside = np.array([bool(np.all(np.isfinite(a))) and scene.depth(a) > 0.0 for a in apex], bool)
-    found = [Pose.through(a, rcm) for a in apex[inside]]
     if number == 1:
-        return found
-    axes = np.einsum("hij,hkj->hki", frame[inside], rig[roll[inside]])
-    wall = apex[inside, None] + scene.eye.intersect(apex[inside, None], axes)[..., None] * axes
+        return [Pose.through(a, rcm) for a in apex if _in_eye(a, scene)]
+    axes = np.einsum("hij,hkj->hki", frame, rig[roll])
+    wall = apex[:, None] + scene.eye.intersect(apex[:, None], axes)[..., None] * axes
     centres, radii = np.array([r.centre for r in rings]), np.array([r.radius for r in rings])
-    own = radii[ring[inside]][:, None, None]
-    off = np.linalg.norm(scene.camera.project(wall)[:, :, None] - centres, axis=3) / own + 0.5 * np.abs(
-        np.log(radii / own)
-    )
+    own = radii[ring][:, None, None]
+    size = 0.5 * np.abs(np.log(radii / own))
+    off = np.linalg.norm(scene.camera.project(wall)[:, :, None] - centres, axis=3) / own + size
     far = np.minimum(np.nan_to_num(off.min(axis=2), nan=_MATCHED), _MATCHED)
     score = np.where(np.sum(far < _MATCHED, axis=1) > 1, far.sum(axis=1), math.inf)
     kept: list[Pose] = []
     for h in np.argsort(score):
-        pose = Pose(found[h].apex, found[h].axis, float(rolls[roll[inside][h]]))
         if not math.isfinite(score[h]) or len(kept) == number + 1:
             break
-        if all(abs(math.remainder(pose.roll - other.roll, 2.0 * math.pi)) > 0.6 for other in kept):
-            kept.append(pose)
+        turn = float(rolls[roll[h]])
+        new = all(abs(math.remainder(turn - other.roll, 2.0 * math.pi)) > _TURNED for other in kept)
+        if new and _in_eye(apex[h], scene):
+            kept.append(Pose(apex[h], Pose.through(apex[h], rcm).axis, turn))
     return kept
+
+
+def _in_eye(apex: Array, scene: Scene) -> bool:
+    return bool(np.all(np.isfinite(apex)) and scene.depth(apex) > 0.0)
 
 
 def _cones(rings: Sequence[Ring], scene: Scene) -> tuple[Array, Array]:

@@ -30,10 +30,13 @@ Array = NDArray[np.float64]
 NOTHING = "no spotlight stands out from its surroundings"
 ELSEWHERE = "the light is not where the fit puts the patch"
 TWO_PLACES = "two places in the frame look like the patch"
-_NEAR = 0.1  # of a patch's radius; starts are good to a third of it
+_NEAR = 0.1  # of a patch's radius within which a fit stays near its start; starts are good to a third of it
+_SAME, _SOLID = 0.3, 0.5  # of it, and share explained, with which a ring is not followed once more
 _RINGS = 6
 _TURNS = 4  # steps from a ring's pose to that of the outline the rays see
 _FEWEST_RAYS = 8
+_HOPELESS = 0.02  # share explained halfway with which no pose has become right
+_STILL_MM = 0.01
 _LEAST_WORTH = 0.2  # share of a ray's gradients that says where the outline is
 #: share of the gradients that a patch explains where nothing else is bright; a disc may explain nearly as much
 CONVINCING = 0.6
@@ -54,10 +57,10 @@ class Start:
     explained: float  #: share of the log light's gradients across the outlines that the cones explain, 0 to 1
     evidence: float  #: their sum along a ray, what it adds to the log-likelihood
 
-    def near(self, pose: Pose, scene: Scene) -> bool:
-        """Whether the outlines of `pose` are where the start found them, as well as a start can tell."""
+    def near(self, pose: Pose, scene: Scene, share: float) -> bool:
+        """Whether the outlines of `pose` are within a `share` of their radius of where the start found them."""
         return all(
-            float(np.linalg.norm(mine[0] - other[0])) + abs(mine[1] - other[1]) < _NEAR * mine[1]
+            float(np.linalg.norm(mine[0] - other[0])) + abs(mine[1] - other[1]) < share * mine[1]
             for mine, other in zip(_circles(self.pose, scene), _circles(pose, scene), strict=True)
         )
 
@@ -111,7 +114,7 @@ def believed(starts: Iterable[Start], scene: Scene, localized: Callable[[Start],
         outcome = localized(start)
         if isinstance(outcome, Localization):
             pose = Pose(outcome.apex_mm, outcome.axis, outcome.roll or 0.0)
-            if start.near(pose, scene):
+            if start.near(pose, scene, _NEAR):
                 if found is not None and float(np.linalg.norm(found.apex_mm - outcome.apex_mm)) > _APART_MM:
                     return LocalizationFailure(TWO_PLACES)
                 found = outcome if found is None else found
@@ -138,9 +141,14 @@ def _settled(
     overview: Overview, scene: Scene, rings: Sequence[Ring], before: Sequence[Start], *, thorough: bool = False
 ) -> list[Start]:
     """The poses that rings lead to, and those found before, without repetition, the best first."""
-    poses = poses_on(rings, scene)
-    settled = (_settle(overview, scene, pose, thorough=thorough) for pose in poses)
-    found = [*before, *(start for start in settled if start is not None)]
+    found = list(before)
+    for pose in poses_on(rings, scene):
+        # another ring on the outline of a start that is all but convincing leads there again
+        if any(start.explained > _SOLID and start.near(pose, scene, _SAME) for start in found):
+            continue
+        start = _settle(overview, scene, pose, thorough=thorough)
+        if start is not None:
+            found.append(start)
     distinct: list[Start] = []
     for start in sorted(found, key=lambda s: -s.evidence):
         if all(_differ(start.pose, other.pose) for other in distinct):
@@ -155,22 +163,25 @@ def _differ(a: Pose, b: Pose) -> bool:
 
 def _settle(overview: Overview, scene: Scene, pose: Pose, *, thorough: bool) -> Start | None:
     """The pose near `pose` whose outlines the rays see; None where there is none."""
-    estimate: Estimate | None = Estimate.at(pose, scene)
+    estimate = Estimate.at(pose, scene)
     for turn in range(_TURNS + 1):
-        if estimate is None:
-            return None
         seen = rays_across(overview, scene, estimate.pose, thorough=thorough)
         if not seen:
             return None
-        if turn == _TURNS:
-            return Start(estimate.pose, *support(seen))
-        points, worth = zip(*(rays.found() for rays in seen), strict=True)
+        points, worth = (np.concatenate(parts) for parts in zip(*(rays.found() for rays in seen), strict=True))
+        here = Start(estimate.pose, *support(seen))
+        if turn == _TURNS or (turn == _TURNS // 2 and here.explained < _HOPELESS):
+            return here
         spots = np.concatenate([np.full(len(r.total), r.spotlight, np.intp) for r in seen])
         sizes = np.concatenate([np.linalg.norm(r.ends - r.middle, axis=1) for r in seen])
-        keep = np.concatenate(worth) > _LEAST_WORTH
-        estimate = _towards(
-            estimate, np.concatenate(points)[keep], spots[keep], np.concatenate(worth)[keep], sizes[keep]
-        )
+        keep = worth > _LEAST_WORTH
+        moved_to = _towards(estimate, points[keep], spots[keep], worth[keep], sizes[keep])
+        if moved_to is None:
+            return None
+        shift = float(np.linalg.norm(moved_to.pose.apex - estimate.pose.apex))
+        if shift < _STILL_MM and abs(moved_to.pose.roll - estimate.pose.roll) < 1e-3:
+            return here
+        estimate = moved_to
     return None
 
 
