@@ -27,7 +27,6 @@ Array = NDArray[np.float64]
 _LEVEL, _SLOPE_PER_MM = 0.3, 3.0
 _SMALLEST = 1e-3  # spread of levels, and of slopes over the width of the band
 _LONGEST_STEP_BINS = 3.0
-_DONE_SIGMAS = 0.05  # a step this short ends the iterations
 #: a last step longer than this, in sigmas of the fit, means that the fit does not settle
 SETTLED_SIGMAS = 1.0
 
@@ -180,12 +179,14 @@ def fit_band(
     inner: float,
     outer: float,
     iterations: int,
+    enough: float,
     tied: bool = False,
     unlit: Unlit | None = None,
 ) -> BandFit | None:
     """Fit the pose to bins of `side` x `side` px from `inner` bins inside the outlines to `outer` bins outside.
 
-    `gains` may be empty: then they are measured. With `tied` the axis stays on the RCM. `unlit` tells the albedo as
+    A step shorter than `enough` sigmas of uncorrelated residuals ends the iterations. `gains` may be empty: then they
+    are measured. With `tied` the axis stays on the RCM. `unlit` tells the albedo as
     far as it shows it. None if too little of the outlines is in the frame or the equations are singular.
     """
     nominal, estimate = start.scene, start
@@ -234,7 +235,7 @@ def fit_band(
                 part, np.append(step, np.zeros(len(part.gradient) - size) if own is None else np.clip(own, -1.0, 1.0))
             )
         length = float(step @ information @ step)
-        if length < _DONE_SIGMAS**2 and turn >= 2:
+        if length < enough**2 and turn >= 2:
             break
     return BandFit(estimate, information, pj, step, tuple(channels), band.covered)
 

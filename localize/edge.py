@@ -17,13 +17,15 @@ from scene.scene import Scene
 
 #: bins across the patch, bins inside and outside the outline, iterations
 _SHARP = ((30, 3.0, 3.0, 6), (70, 4.0, 4.0, 4))
-_SOFT = ((30, 6.0, 2.0, 6), (65, 20.0, 3.0, 5), (100, 35.0, 5.0, 8))
+_SOFT = ((30, 6.0, 2.0, 6), (40, 14.0, 3.0, 10))
 _CLIPPED = ((40, 8.0, 3.0, 6), (130, 20.0, 4.0, 5))
 #: a sharp edge and a clipped patch's rim end at full resolution: least bins inside, reach inside [mm], bins outside
 _FULL_SHARP = (5.0, 0.025, 5.0)
 _FULL_CLIPPED = (4.0, 0.015, 3.0)
 
 
+#: a step this short [sigmas] ends a stage that others follow, and the last one
+_ENOUGH = (1.0, 0.1)
 _SATURATED = (30, 90)  # bins across a patch that is clipped throughout, before full resolution
 
 EdgeFit = BandFit | SaturatedFit
@@ -83,7 +85,8 @@ def fit_edge(
     for number, (side, inner, outer, iterations) in enumerate(stages):
         fit = fit_band(
             image, estimate, gains, knowns, noise,
-            side=side, inner=inner, outer=outer, iterations=iterations, tied=number == 0, unlit=unlit,
+            side=side, inner=inner, outer=outer, iterations=iterations,
+            enough=_ENOUGH[number + 1 == len(stages)], tied=number == 0, unlit=unlit,
         )  # fmt: skip
         if fit is None:
             return UNCERTAIN if number else COVERED

@@ -165,13 +165,18 @@ def light(
         slope = slope * stretch * f
         rows[:3] -= slope * across.T
         for j, vector in enumerate(basis):
-            rows[3 + j] += slope * (to @ np.cross(vector, axis))
+            rows[3 + j] += slope * (to @ _cross(vector, axis))
         for j, (more, less, between) in enumerate(changes, start=3 + len(basis)):
             rows[j] += f * (more.mean(w, px, py)[0] - less.mean(w, px, py)[0]) / between
     value = total * f
     falloff = (sight.normals / d2[:, None] + 3.0 * (cosine / d2)[:, None] * to) / d[:, None]
     rows[:3] += np.where(cosine > 0.0, total, 0.0) * falloff.T
     return Light(value, rows)
+
+
+def _cross(a: Array, b: Array) -> Array:
+    """The cross product of two vectors `[3]`, in a tenth of the time of numpy's."""
+    return np.array([a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]])
 
 
 def light_by_surface(here: Light, sight: Sight, pose: Pose, sides: tuple[Sight, Sight], step: float) -> Array:

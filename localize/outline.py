@@ -24,20 +24,21 @@ def distances(pixels: Array, spots: NDArray[np.intp], estimate: Estimate, *, rol
     """
     pose = estimate.pose
     sight = look(estimate.scene, pixels)
-    axes = spotlight_axes(pose, estimate.scene.spotlights)[spots]
+    each = spotlight_axes(pose, estimate.scene.spotlights)
+    axes = each[spots]
     to = sight.points - pose.apex
     d = np.linalg.norm(to, axis=1)
     to = to / d[:, None]
     c = np.einsum("ij,ij->i", to, axes)
-    perpendicular = np.cross(to, axes)
-    s = np.maximum(np.linalg.norm(perpendicular, axis=1), 1e-12)
+    aside = axes - c[:, None] * to
+    s = np.maximum(np.linalg.norm(aside, axis=1), 1e-12)
     # the arc tangent keeps full precision where the arc cosine loses half the digits
     residual = np.arctan2(s, c) - estimate.scene.beam.half_angle
-    across = -(axes - c[:, None] * to) / (d * s)[:, None]  # gradient of the angle over the surface point
+    across = -aside / (d * s)[:, None]  # gradient of the angle over the surface point
     gx, gy = (np.einsum("ij,ij->i", across, along) for along in (sight.along_x, sight.along_y))
     slope = np.hypot(gx, gy)
     basis = rotation_basis(pose.axis)[: 3 if roll else 2]
-    turns = [-np.einsum("ij,ij->i", to, np.cross(vector, axes)) / s for vector in basis]
+    turns = [-np.einsum("ij,ij->i", to, np.cross(vector, each)[spots]) / s for vector in basis]
     jacobian = np.column_stack([-across, *turns]) / slope[:, None]
     return residual / slope, jacobian, -1.0 / slope
 

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,15 +23,9 @@ class Profile:
     """A beam profile g(w) as polynomials between knots: 0 before the first, the last one beyond the last."""
 
     knots: Array  #: increasing `[S]`
-    coefficients: Array  #: of g in (w - knot), constant first `[S, D]`
+    coefficients: Array  #: of g in (w - knot), constant first, cubic at most `[S, D]`
     cosine: bool  #: whether w is the cosine; otherwise minus the angle [rad]
     half_angle: float  #: [rad]
-
-    def __post_init__(self) -> None:
-        """Integrate g twice, piece by piece."""
-        once = _integrate(self.knots, self.coefficients)
-        object.__setattr__(self, "_once", once)
-        object.__setattr__(self, "_twice", _integrate(self.knots, once))
 
     @classmethod
     def of(cls, beam: Beam) -> Profile:
@@ -76,27 +71,45 @@ class Profile:
 
         [H(w+p+q) - H(w+p-q) - H(w-p+q) + H(w-p-q)] / 4pq with H'' = g; px, py are half rises, not negative.
         """
-        largest = np.maximum(px, py)
-        floor = np.maximum(1e-3 * largest, 1e-9)
-        p, q = np.maximum(px, floor), np.maximum(py, floor)
-        mean, slope = np.empty_like(w), np.zeros_like(w)
-        reach = p + q
-        # beyond the last knot every profile is constant
-        flat = w > self.knots[-1] + reach
-        dark = w < self.knots[0] - reach
-        mean[flat] = self._piecewise(self.coefficients, w[flat])
-        mean[dark] = 0.0
-        edge = np.flatnonzero(~(flat | dark))
-        a, b, c = w[edge], p[edge], q[edge]
-        twice: Array = self._twice  # type: ignore[attr-defined]
-        once: Array = self._once  # type: ignore[attr-defined]
-        area = 4.0 * b * c
-        corners = (a + b + c, a + b - c, a - b + c, a - b - c)
-        h = [self._piecewise(twice, x) for x in corners]
+        mean, slope = np.zeros_like(w), np.zeros_like(w)
+        reach = px + py
+        # beyond the last knot every profile is constant, before the first it is dark
+        mean[w > self.knots[-1] + reach] = self.coefficients[-1, 0]
+        near = np.flatnonzero((w >= self.knots[0] - reach) & (w <= self.knots[-1] + reach))
+        a, p, q, r = w[near], px[near], py[near], reach[near]
+        piece = np.searchsorted(self.knots, a - r, side="right")
+        within = piece == np.searchsorted(self.knots, a + r, side="right")
+        inside, at = near[within], piece[within] - 1
+        # a pixel inside one piece: of a cubic's Taylor series only the second derivative adds to the mean
+        spread = (np.square(p[within]) + np.square(q[within])) / 6.0
+        x = a[within] - self.knots[at]
+        c = self._cubic[:, at]
+        mean[inside] = ((c[3] * x + c[2]) * x + c[1]) * x + c[0] + spread * (2.0 * c[2] + 6.0 * c[3] * x)
+        slope[inside] = (3.0 * c[3] * x + 2.0 * c[2]) * x + c[1] + spread * 6.0 * c[3]
+        across = ~within
+        edge, a, p, q = near[across], a[across], p[across], q[across]
+        floor = np.maximum(1e-3 * np.maximum(p, q), 1e-9)
+        p, q = np.maximum(p, floor), np.maximum(q, floor)
+        area = 4.0 * p * q
+        corners = (a + p + q, a + p - q, a - p + q, a - p - q)
+        h = [self._piecewise(self._twice, corner) for corner in corners]
         mean[edge] = (h[0] - h[1] - h[2] + h[3]) / area
-        h = [self._piecewise(once, x) for x in corners]
+        h = [self._piecewise(self._once, corner) for corner in corners]
         slope[edge] = (h[0] - h[1] - h[2] + h[3]) / area
         return mean, slope
+
+    @cached_property
+    def _once(self) -> Array:
+        return _integrate(self.knots, self.coefficients)
+
+    @cached_property
+    def _twice(self) -> Array:
+        return _integrate(self.knots, self._once)
+
+    @cached_property
+    def _cubic(self) -> Array:
+        """Coefficients of the pieces, constant first `[4, S]`."""
+        return np.pad(self.coefficients, ((0, 0), (0, 4 - self.coefficients.shape[1]))).T
 
     def _piecewise(self, coefficients: Array, w: Array) -> Array:
         if len(self.knots) == 1:
