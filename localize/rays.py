@@ -26,6 +26,7 @@ _NEEDED = len(_ALONG) - 4  # samples of a ray that must be in the frame
 SHIFTS = 0.03 * np.arange(-8, 9)  #: of the outline that are tried
 _FRACTIONS = np.linspace(0.0, 2.5, 501)  # of the half angle
 _WHITE = 0.97
+_USUAL_CONTRAST = 30.0  # of a patch over its surroundings; its logarithm is what matters
 _WIDEST = 0.25  # blur of the profile
 #: contrasts that are tried, over the one measured: of a clipped patch only the rim is seen, and where other things
 #: are bright what lies inside and outside the outline says little
@@ -146,6 +147,13 @@ def _profile(beam: Beam) -> Array:
     profile = Profile.of(beam)
     angle = _FRACTIONS * profile.half_angle
     return profile.value(np.cos(angle) if profile.cosine else -angle)
+
+
+@lru_cache(maxsize=8)
+def rim(beam: Beam) -> float:
+    """Where a patch's rim seems to be, over the half angle: the mean place of the log light's gradients."""
+    drop = -np.diff(np.log1p(_USUAL_CONTRAST * _profile(beam)))
+    return float(np.sum(drop * 0.5 * (_FRACTIONS[1:] + _FRACTIONS[:-1])) / np.sum(drop))
 
 
 @lru_cache(maxsize=64)

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from localize.forward import look
+from localize.rays import rim
 from localize.rings import Ring
 from scene.pose import Pose
 from scene.scene import Scene
@@ -66,14 +67,14 @@ def _in_eye(apex: Array, scene: Scene) -> bool:
 
 
 def _cones(rings: Sequence[Ring], scene: Scene) -> tuple[Array, Array]:
-    """Where the rings lie on the wall `[N, 3]`, and how far from there a cone as wide has its apex `[N]` [mm]."""
+    """Where the rings lie on the wall `[N, 3]`, and how far away the cones that show them have their apex `[N]`."""
     rcm = np.asarray(scene.instrument.rcm)
     edges = look(scene, np.concatenate([ring.curve() for ring in rings])).points.reshape(len(rings), -1, 3)
     middles = edges.mean(axis=1)
     line = (middles - rcm) / np.linalg.norm(middles - rcm, axis=1, keepdims=True)
     off = edges - middles[:, None]
     off = off - np.einsum("nij,nj->ni", off, line)[..., None] * line[:, None]
-    away = np.linalg.norm(off, axis=2).mean(axis=1) / math.tan(scene.beam.half_angle)
+    away = np.linalg.norm(off, axis=2).mean(axis=1) / math.tan(scene.beam.half_angle * rim(scene.beam))
     return middles, np.minimum(away, 0.95 * np.linalg.norm(middles - rcm, axis=1))
 
 

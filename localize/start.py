@@ -100,6 +100,8 @@ def find_starts(
         more = [ring for curve in hidden for ring in find_rings(overview, scene, most, [curve])]
         more += find_rings(overview, scene, most, small=True)
         found = _settled(overview, scene, [*rings, *more], found, thorough=True)
+    if found:
+        found = _merged([*found, *_turned(overview, scene, found[0].pose)])
     for start in found[:_FITTED]:
         share = _AS_GOOD if found[0].explained > CONVINCING else _TOUCHING if start.touches(found[0], scene) else _APART
         if start.explained > _LEAST and start.evidence >= share * found[0].evidence:
@@ -149,6 +151,21 @@ def _settled(
         start = _settle(overview, scene, pose, thorough=thorough)
         if start is not None:
             found.append(start)
+    return _merged(found)
+
+
+def _turned(overview: Overview, scene: Scene, pose: Pose) -> Iterator[Start]:
+    """The starts with each spotlight in the next one's place, and so on: a rig may nearly repeat when it turns."""
+    number = len(scene.spotlights)
+    for k in range(1, number):
+        other = Pose(pose.apex, pose.axis, pose.roll + 2.0 * math.pi * k / number)
+        start = _settle(overview, scene, other, thorough=False)
+        if start is not None:
+            yield start
+
+
+def _merged(found: Sequence[Start]) -> list[Start]:
+    """The starts without repetition, the best first."""
     distinct: list[Start] = []
     for start in sorted(found, key=lambda s: -s.evidence):
         if all(_differ(start.pose, other.pose) for other in distinct):
