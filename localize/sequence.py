@@ -20,6 +20,7 @@ from localize.prior import Estimate, Knowns
 from localize.start import find_start
 from localize.view import outlines
 from scene.document import InputError
+from scene.emva import Emva
 from scene.scene import Scene
 
 Array = NDArray[np.float64]
@@ -27,14 +28,20 @@ _MARGIN = 0.25  # of a patch's size, kept out around it: a start is good to a tw
 
 
 class AmbientMap:
-    """The mean of what frames show outside their patches; memory is two frames, however many are added."""
+    """The mean of what frames show outside their patches; memory is two frames, however many are added.
+
+    A camera that meters each frame shows the same retina at another level in each. Summed light over summed levels is
+    the mean that no seam betrays, and the one of least noise.
+    """
 
     def __init__(self, scene: Scene) -> None:
         self._scene = scene
+        self._black = scene.sensor.black_level if isinstance(scene.sensor, Emva) else 0.0
+        self._white = 1.0
         self._sum: NDArray[np.float32] | None = None
-        self._white = np.float32(1.0)
         side = scene.camera.resolution
-        self._count = np.zeros((side, side), np.uint16)
+        self._levels = np.zeros((side, side), np.float32)
+        self._added: list[float] = []
 
     def add(self, image: NDArray[np.generic]) -> bool:
         """Add a checked frame; False, and nothing added, if no patch can be found in it to leave out."""
@@ -46,33 +53,44 @@ class AmbientMap:
             return False
         if self._sum is None:
             self._sum = np.zeros(image.shape, np.float32)
-            self._white = np.float32(1.0 if image.dtype.kind == "f" else white_level(image, self._scene))
+            if image.dtype.kind == "f":
+                self._black /= self._scene.sensor.full_scale
+            else:
+                self._white = float(white_level(image, self._scene))
         elif self._sum.shape != image.shape:
             raise InputError(f"sequence: a frame of shape {image.shape} after frames of {self._sum.shape}")
         margin = _MARGIN * float(np.max(np.ptp(points, axis=0))) + 3.0
         low = np.floor(points.min(axis=0) - margin).astype(int).clip(0)
         high = np.ceil(points.max(axis=0) + margin).astype(int)
         hidden = (slice(low[1], high[1]), slice(low[0], high[0]))
-        kept = self._sum[hidden].copy()
-        self._sum += image.astype(np.float32)
-        self._sum[hidden] = kept
-        self._count += 1
-        self._count[hidden] -= 1
+        light = image.astype(np.float32) - np.float32(self._black)
+        stride = max(1, len(image) // 500)
+        coarse = np.ones(image.shape[:2], bool)
+        coarse[hidden] = False
+        level = float(np.median(light[::stride, ::stride][coarse[::stride, ::stride]]))
+        if not level > 0.0:  # no light but the spotlights': nothing to learn
+            return False
+        light[hidden] = 0.0
+        self._sum += light
+        self._levels += np.float32(level) * coarse
+        self._added.append(level)
         return True
 
     def reference(self) -> Reference | None:
-        """The ambient view, a mean over as many frames as show the pixels in the median.
+        """The ambient view at the frames' mean level, and how many frames its pixels are worth in the median.
 
         Pixels that no frame shows unlit get the median of the others. None if fewer than two frames were added.
         """
-        if self._sum is None or int(self._count.max()) < 2:
+        if self._sum is None or len(self._added) < 2:
             return None
-        count = self._count if self._sum.ndim == 2 else self._count[..., None]
-        view = self._sum / np.maximum(count, 1)
-        seen = self._count > 0
+        seen = self._levels > 0.0
+        mean = float(np.mean(self._added))
+        scale = np.float32(mean) / np.where(seen, self._levels, np.float32(1.0))
+        view = self._sum * (scale if self._sum.ndim == 2 else scale[..., None])
         if not seen.all():
             view[~seen] = np.median(view[seen][:: max(1, int(seen.sum()) // 100_000)], axis=0)
-        return Reference((view / self._white).astype(np.float32), float(np.median(self._count[seen])))
+        pixels = (view + np.float32(self._black)) / np.float32(self._white)
+        return Reference(pixels.astype(np.float32), float(np.median(self._levels[seen])) / mean)
 
 
 @dataclass(frozen=True)
