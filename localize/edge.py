@@ -19,11 +19,8 @@ from scene.scene import Scene
 _SHARP = ((30, 3.0, 3.0, 6), (70, 4.0, 4.0, 4))
 _SOFT = ((30, 6.0, 2.0, 6), (40, 14.0, 3.0, 10))
 _CLIPPED = ((40, 8.0, 3.0, 6), (130, 20.0, 4.0, 5))
-#: a sharp edge and a clipped patch's rim end at full resolution: least bins inside, reach inside [mm], bins outside
-_FULL_SHARP = (5.0, 0.025, 5.0)
-_FULL_CLIPPED = (4.0, 0.015, 3.0)
-
-
+#: a sharp edge and a clipped patch's rim end at full resolution
+_FULL = (1, 5.0, 3.0, 8)
 #: a step this short [sigmas] ends a stage that others follow, and the last one
 _ENOUGH = (1.0, 0.1)
 _SATURATED = (30, 90)  # bins across a patch that is clipped throughout, before full resolution
@@ -77,9 +74,8 @@ def fit_edge(
     plan = _SOFT if not full else _SHARP if sharp else _CLIPPED
     stages = [(max(1, int(size / bins)), inner, outer, turns) for bins, inner, outer, turns in plan]
     if full:
-        least, reach, outside = _FULL_SHARP if sharp else _FULL_CLIPPED
         stages = [stage for stage in stages if stage[0] > 1]
-        stages.append((1, max(least, reach / scene.camera.pixel_pitch), outside, 8))
+        stages.append(_FULL)
     gains: tuple[float, ...] = ()
     fit: BandFit | None = None
     for number, (side, inner, outer, iterations) in enumerate(stages):

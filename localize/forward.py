@@ -39,7 +39,7 @@ def tangents(axis: Array) -> tuple[Array, Array]:
 def rotation_basis(axis: Array) -> Array:
     """Rotation vectors `[3, 3]`, one a row, that move `axis` along U, along V, and roll about it [rad]."""
     u, v = tangents(axis)
-    return np.stack([np.cross(axis, u), np.cross(axis, v), axis])
+    return np.stack([-v, u, axis])
 
 
 def moved(pose: Pose, step: Array) -> Pose:

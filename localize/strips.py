@@ -130,42 +130,42 @@ def score_covariance(strips: Strips, scores: Array, parts: Array) -> Array:
     values = np.maximum(values, 1e-12 * values.max())
     total = np.zeros_like(parts[0])
     for turn in strips.turns:
-        for value, direction in zip(values[turn].T, np.moveaxis(vectors[turn], 2, 0), strict=True):
-            # directions have no sign of their own: neighbours' are alike
-            turned = np.einsum("sp,sp->s", direction[1:], direction[:-1]) < 0.0
-            along = direction * np.cumprod(np.append(1.0, np.where(turned, -1.0, 1.0)))[:, None]
-            power = _power(np.einsum("sp,sp->s", scores[turn] / scale, along) / np.sqrt(value))
-            waves = np.fft.rfft(np.sqrt(value)[:, None] * along, axis=0) * np.sqrt(power)[:, None]
-            total += np.real(waves.T @ waves.conj()) / len(value)
+        size, along = np.sqrt(values[turn]), np.array(vectors[turn])
+        # directions have no sign of their own: neighbours' are alike
+        turned = np.einsum("spj,spj->sj", along[1:], along[:-1]) < 0.0
+        along[1:] *= np.cumprod(np.where(turned, -1.0, 1.0), axis=0)[:, None]
+        power = _power(np.einsum("sp,spj->js", scores[turn] / scale, along) / size.T)
+        waves = np.fft.rfft(along * size[:, None], axis=0) * np.sqrt(power).T[:, None]
+        total += np.real(np.einsum("mpj,mqj->pq", waves, waves.conj())) / len(size)
     return np.asarray(total * np.outer(scale, scale))
 
 
 def _power(series: Array) -> Array:
-    """The power spectrum of a series `[n]` around the outline at `[n // 2 + 1]` harmonics, smooth in frequency.
+    """The power spectra of series around the outline `[D, n]` at `[D, n // 2 + 1]` harmonics, smooth in frequency.
 
     1 for independent values of sigma 1; both signs of a frequency count. White noise and a part that falls above some
     frequency, as what an albedo does to edges does: the mean over such spectra, each by its likelihood (Whittle's).
     """
-    count = len(series)
+    count = series.shape[1]
     harmonic = np.arange(count // 2 + 1)
     twice = np.where((harmonic == 0) | (2 * harmonic == count), 1.0, 2.0)
     raw = np.square(np.abs(np.fft.rfft(series))) / count + 1e-12
     # a handful of frequencies tells as much as all of them
-    edges = np.unique(np.geomspace(_FITTED, len(raw), 24).astype(int))
+    edges = np.unique(np.geomspace(_FITTED, len(harmonic), 24).astype(int))
     if len(edges) < 5:
-        return twice
+        return np.tile(twice, (len(series), 1))
     number = np.diff(edges)
-    observed = np.add.reduceat(raw[: edges[-1]], edges[:-1]) / number
+    observed = (np.add.reduceat(raw[:, : edges[-1]], edges[:-1], axis=1) / number)[:, None]
     middle = 0.5 * (edges[1:] + edges[:-1] - 1)
     shape = 1.0 / (1.0 + np.square(middle / _KNEES[:, None]))
-    amounts = 0.5 * np.mean(observed) / np.stack([np.ones(len(shape)), shape.mean(axis=1)])
+    both = np.stack([np.ones_like(shape), shape])[:, None]
+    amounts = 0.5 * observed.mean(axis=2) / both.mean(axis=3)
     for _ in range(20):
-        model = amounts[0][:, None] + amounts[1][:, None] * shape
+        model = np.einsum("adk,akb->dkb", amounts, both[:, 0])
         weight = number / np.square(model)
-        both = np.stack([np.ones_like(shape), shape])
-        amounts = amounts * (weight * observed * both).sum(axis=2) / (weight * model * both).sum(axis=2)
-    cost = np.sum(number * (np.log(model) + observed / model), axis=1)
-    share = np.exp(cost.min() - cost)
-    share /= share.sum()
-    smooth = share @ amounts[0] + (share * amounts[1]) @ (1.0 / (1.0 + np.square(harmonic / _KNEES[:, None])))
+        amounts = amounts * (weight * observed * both).sum(axis=3) / (weight * model * both).sum(axis=3)
+    cost = np.sum(number * (np.log(model) + observed / model), axis=2)
+    share = np.exp(cost.min(axis=1, keepdims=True) - cost)
+    white, red = amounts * share / share.sum(axis=1, keepdims=True)
+    smooth = white.sum(axis=1)[:, None] + red @ (1.0 / (1.0 + np.square(harmonic / _KNEES[:, None])))
     return np.asarray(twice * np.maximum(smooth, 1e-9))
