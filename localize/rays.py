@@ -11,6 +11,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from localize.occlusion import covered
 from localize.profile import Profile
 from localize.rings import Overview, Plane
 from scene.beam import Beam
@@ -75,20 +76,27 @@ def rays_across(overview: Overview, scene: Scene, pose: Pose, *, thorough: bool 
     """
     curves = [scene.camera.project(scene.outline(pose, k, _RAYS)) for k in range(len(scene.spotlights))]
     found = [
-        _across(overview, scene.beam, curves, k, thorough)
+        _across(overview, scene, pose, curves, k, thorough)
         for k, curve in enumerate(curves)
         if np.all(np.isfinite(curve))
     ]
     return [rays for rays in found if rays is not None]
 
 
-def _across(overview: Overview, beam: Beam, curves: Sequence[Array], spotlight: int, thorough: bool) -> Rays | None:
+def _across(
+    overview: Overview, scene: Scene, pose: Pose, curves: Sequence[Array], spotlight: int, thorough: bool
+) -> Rays | None:
     curve = curves[spotlight]
     last = overview.light.shape[0] - 1.0
     bins = curve / overview.step - 0.5
     middle = bins.mean(axis=0)
     at = middle + _ALONG[None, :, None] * (bins - middle)[:, None, :]
     valid = np.all((at >= 0.0) & (at <= last), axis=2)
+    if scene.instrument.shaft is not None:
+        pixels = ((at + 0.5) * overview.step).reshape(-1, 2)
+        clear = valid & ~covered(pixels, pose, scene, side=overview.step).reshape(valid.shape)
+        # a pose far off does not tell where the shaft is
+        valid = clear if np.count_nonzero(clear[:, :_NEEDED].all(axis=1)) >= _RAYS // 4 else valid
     use = valid[:, :_NEEDED].all(axis=1)
     if np.count_nonzero(use) < _RAYS // 4:
         return None
@@ -99,7 +107,7 @@ def _across(overview: Overview, beam: Beam, curves: Sequence[Array], spotlight: 
     ground = None if overview.reference is None else _sampled(overview.reference, at, blur)
     log = overview.logarithm(light, ground).astype(float)
     inside, outside = (float(np.median(log[:, part])) for part in (_INSIDE, _OUTSIDE))
-    profile, kernel = _profile(beam), _kernel(round(min(_WIDEST, math.hypot(blur, 0.4) / size), 2))
+    profile, kernel = _profile(scene.beam), _kernel(round(min(_WIDEST, math.hypot(blur, 0.4) / size), 2))
     contrast = math.expm1(max(0.05, inside - outside)) / max(0.02, float(np.interp(0.6, _FRACTIONS, profile)))
     clipped = float(np.mean(light[:, _INSIDE] > _WHITE)) > 0.3
     ceiling = (1.0 + overview.floor) / math.exp(outside) if clipped else math.inf

@@ -9,6 +9,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from localize.occlusion import covered
 from localize.outline import distances
 from localize.prior import Estimate
 from localize.start import nearest_outline
@@ -27,7 +28,7 @@ class Ribbon:
     spots: NDArray[np.intp]  #: the spotlight whose outline is nearest `[N]`
     shown: tuple[Channel, ...]  #: what the bins show, `[N]` each
     strips: Strips
-    covered: float  #: share of the outlines in the frame
+    covered: float  #: share of the outlines that the frame shows
 
     @classmethod
     def along(
@@ -48,9 +49,11 @@ class Ribbon:
         edge = scene.camera.resolution // side
         curves, seen = [], []
         for k in range(len(scene.spotlights)):
-            points = scene.camera.project(scene.outline(estimate.pose, k, 180)) / side - 0.5
+            outline = scene.camera.project(scene.outline(estimate.pose, k, 180))
+            points = outline / side - 0.5
             finite = np.all(np.isfinite(points), axis=1)
             inside = finite & np.all((points > 1.0) & (points < edge - 2.0), axis=1)
+            inside &= ~covered(outline, estimate.pose, scene, side=side)
             seen.append(float(np.mean(inside)))
             if inside.sum() >= 10:
                 curves.append(points[finite])
@@ -70,6 +73,7 @@ class Ribbon:
         spots, alone = nearest_outline(pixels, estimate)
         distance = distances(pixels, spots, estimate, roll=len(scene.spotlights) > 1)[0] / side
         keep = np.isfinite(distance) & alone & (distance > -inner) & (distance < outer)
+        keep &= ~covered(pixels, estimate.pose, scene, side=side)
         if np.count_nonzero(keep) < _FEWEST:
             return None
         row, column, pixels, spots, distance = row[keep], column[keep], pixels[keep], spots[keep], distance[keep]

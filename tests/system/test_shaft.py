@@ -1,0 +1,47 @@
+"""A visible shaft in front of the patch and its shadow: what is left of the patch tells the tip."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from localize import locate
+from localize.occlusion import covered
+from localize.prior import Knowns
+from localize.theory import patch_pixels
+from render import Exposure, Renderer
+from scene import Camera, Scene
+from scene.beam import CyclesBeam, HardBeam
+from scene.retina import PhotoRetina
+from scene.sensor import Linear
+from scene.spotlights import RIGS, Instrument, Shaft
+
+KNOWNS = Knowns(rcm_sigma_mm=None)
+#: light, rig, tip [mm], largest error [mm]: hard edges to a micrometre or two, a soft one on texture to tens of them
+CASES = [
+    (HardBeam(), "single", (5.0, 1.0, 4.0), 2e-3),
+    (HardBeam(), "single", (3.0, 1.0, 4.0), 2e-3),
+    (HardBeam(), "triple", (5.0, 1.0, 4.0), 1e-3),
+    (CyclesBeam(), "single", (4.0, -1.0, 3.0), 0.05),
+]
+
+
+@pytest.mark.parametrize(("beam", "rig", "tip", "largest"), CASES)
+def test_a_patch_behind_the_shaft_counts_with_what_is_visible(beam, rig, tip, largest):
+    scene = Scene(
+        camera=Camera(resolution=1000),
+        beam=beam,
+        retina=PhotoRetina(),
+        sensor=Linear(bits=12),
+        spotlights=RIGS[rig],
+        instrument=Instrument(shaft=Shaft()),
+    )
+    pose = scene.pose(np.array(tip))
+    renderer = Renderer(scene, samples=64, edge_samples=512)
+    tiles = [renderer.tile(pose, k, seed=k + 1) for k in range(len(scene.spotlights))]
+    image = Exposure(renderer.background(pose), scene.sensor).frame(tiles, 0.004)
+    hidden = covered(patch_pixels(scene, pose), pose, scene)
+    assert hidden.mean() > 0.05, "the shaft must be in the way for this to mean anything"
+    found = locate(image, scene, "cone", knowns=KNOWNS)
+    assert found
+    assert np.linalg.norm(found.apex_mm - pose.apex) < largest
