@@ -35,7 +35,7 @@ _SAME, _SOLID = 0.3, 0.5  # of it, and share explained, with which a ring is not
 _RINGS = 6
 _TURNS = 4  # steps from a ring's pose to that of the outline the rays see
 _FEWEST_RAYS = 8
-_HOPELESS = 0.02  # share explained halfway with which no pose has become right
+_DARK = 0.05  # share explained of one spotlight's outline below which it is not there
 _STILL_MM = 0.01
 _LEAST_WORTH = 0.2  # share of a ray's gradients that says where the outline is
 #: share of the gradients that a patch explains where nothing else is bright; a disc may explain nearly as much
@@ -101,7 +101,7 @@ def find_starts(
         more += find_rings(overview, scene, most, small=True)
         found = _settled(overview, scene, [*rings, *more], found, thorough=True)
     if found:
-        found = _merged([*found, *_turned(overview, scene, found[0].pose)])
+        found = _merged([*found, *_turned(overview, scene, found[0])])
     for start in found[:_FITTED]:
         share = _AS_GOOD if found[0].explained > CONVINCING else _TOUCHING if start.touches(found[0], scene) else _APART
         if start.explained > _LEAST and start.evidence >= share * found[0].evidence:
@@ -154,12 +154,15 @@ def _settled(
     return _merged(found)
 
 
-def _turned(overview: Overview, scene: Scene, pose: Pose) -> Iterator[Start]:
-    """The starts with each spotlight in the next one's place, and so on: a rig may nearly repeat when it turns."""
-    number = len(scene.spotlights)
-    for k in range(1, number):
-        other = Pose(pose.apex, pose.axis, pose.roll + 2.0 * math.pi * k / number)
-        start = _settle(overview, scene, other, thorough=False)
+def _turned(overview: Overview, scene: Scene, best: Start) -> Iterator[Start]:
+    """The starts with each spotlight in the next one's place, and so on: a rig may nearly repeat when it turns.
+
+    Turned by half as much, all patches but one may still fall on one another.
+    """
+    parts = len(scene.spotlights) * (1 if best.explained > CONVINCING else 2)
+    for k in range(1, parts if len(scene.spotlights) > 1 else 1):
+        pose = Pose(best.pose.apex, best.pose.axis, best.pose.roll + 2.0 * math.pi * k / parts)
+        start = _settle(overview, scene, pose, thorough=False)
         if start is not None:
             yield start
 
@@ -186,8 +189,10 @@ def _settle(overview: Overview, scene: Scene, pose: Pose, *, thorough: bool) -> 
         if not seen:
             return None
         points, worth = (np.concatenate(parts) for parts in zip(*(rays.found() for rays in seen), strict=True))
-        here = Start(estimate.pose, *support(seen))
-        if turn == _TURNS or (turn == _TURNS // 2 and here.explained < _HOPELESS):
+        # a spotlight of which the frame shows nothing where it should be denies the whole pose
+        lit = min(support([rays])[0] for rays in seen) > _DARK
+        here = Start(estimate.pose, *support(seen)) if lit else None
+        if turn == _TURNS:
             return here
         spots = np.concatenate([np.full(len(r.total), r.spotlight, np.intp) for r in seen])
         sizes = np.concatenate([np.linalg.norm(r.ends - r.middle, axis=1) for r in seen])

@@ -2,6 +2,7 @@
 
 import math
 from functools import lru_cache
+from itertools import pairwise
 
 import cv2
 import numpy as np
@@ -127,6 +128,13 @@ def test_a_rig_is_found_with_its_roll_beside_a_disc(beam, roll):
     assert abs(math.remainder(start.pose.roll - roll, 2.0 * math.pi)) < 0.02
 
 
+def test_a_rig_of_which_one_patch_is_missing_is_not_found():
+    scene = scene_of("hard", "triple")
+    pose = scene.pose(np.array(TIPS[0]))
+    two = scene.model_copy(update={"spotlights": scene.spotlights[:2]})
+    assert find_start(frame(two, pose), scene) == NOTHING
+
+
 def test_a_rig_whose_patches_merge_is_found():
     scene = scene_of("soft", "triple")
     scene = scene.model_copy(update={"beam": CyclesBeam(half_angle=math.radians(12.0))})
@@ -166,7 +174,7 @@ def test_the_best_start_comes_first_and_no_two_are_the_same():
     scene = scene_of("half soft")
     pose = scene.pose(np.array([DISC[0] - 0.9, DISC[1] - 1.2, 5.0]))
     starts = list(find_starts(frame(scene, pose, disc=20.0), scene))
-    assert all(a.evidence >= b.evidence for a, b in zip(starts, starts[1:], strict=False))
+    assert all(a.evidence >= b.evidence for a, b in pairwise(starts))
     for k, start in enumerate(starts):
         assert all(np.linalg.norm(start.pose.apex - other.pose.apex) > 0.1 for other in starts[:k])
 
