@@ -7,7 +7,7 @@ import cv2
 import numpy as np
 import pytest
 
-from localize import Knowns, Localization, SensorNoise, locate
+from localize import Knowns, Localization, Reference, SensorNoise, locate
 from localize.calibration import NAMES, calibrate
 from localize.sequence import locate_sequence
 from localize.theory import cramer_rao
@@ -157,6 +157,53 @@ def test_a_reference_frame_makes_a_soft_patch_on_texture_sharper():
     alone = locate(lit, scene, "photometric", knowns=Knowns(0.01), noise=NOISE)
     assert miss_um(found, pose) < 6.0
     assert np.trace(found.covariance[:3, :3]) < np.trace(alone.covariance[:3, :3])
+
+
+def test_the_mean_of_many_reference_frames_makes_a_hard_patch_on_coarse_texture_sharper():
+    scene = scene_of(HardBeam())
+    pose, texture = scene.pose(np.array(TIPS[0])), fundus(0.5)
+    lit = photograph(scene, pose, texture)
+    centres = np.arange(1000) + 0.5
+    wall = cast(scene, centres, centres)
+    unlit = Reference((AMBIENT / WHITE * albedo(texture, wall) * upward(scene, wall)).astype(np.float32), 1000.0)
+    found = locate(lit, scene, "photometric", knowns=FREE, noise=NOISE, reference=unlit)
+    alone = locate(lit, scene, "photometric", knowns=FREE, noise=NOISE)
+    assert miss_um(found, pose) < 4.0
+    assert np.trace(found.covariance[:3, :3]) < 0.8 * np.trace(alone.covariance[:3, :3])
+
+
+def test_soft_ellipsoids_on_texture_hold_what_they_state():
+    scene, rng = scene_of(CyclesBeam()), np.random.default_rng(8)
+    squares = []
+    for seed, contrast in enumerate((0.1, 0.2, 0.4) * 3):
+        tip = rng.uniform((-2.0, -2.0, 3.0), (2.0, 2.0, 5.0))
+        pose = scene.pose(tip)
+        rcm = tuple(np.array(scene.instrument.rcm) + 0.05 * rng.standard_normal(3))
+        told = scene.model_copy(update={"instrument": scene.instrument.model_copy(update={"rcm": rcm})})
+        lit = photograph(scene, pose, fundus(contrast, seed), seed, rays=2)
+        found = locate(lit, told, "photometric", knowns=Knowns(0.05), noise=NOISE)
+        assert found
+        squares.append(sigmas_off(found, pose) ** 2)
+    assert max(squares) < 14.2  # 99.7 % of a chi square with three degrees of freedom
+    assert 0.25 < np.mean(squares) / 3.0 < 2.0
+
+
+def test_the_colours_of_a_vessel_take_it_off_the_albedo():
+    scene, grey, red = scene_of(CyclesBeam()), fundus(0.05, 2), fundus(0.4, 3)
+    pose = scene.pose(np.array(TIPS[0]))
+    channels = [photograph(scene, pose, grey * red**share, seed, rays=2) for seed, share in enumerate((0.2, 1.0, 1.2))]
+    colour = locate(np.stack(channels, axis=2), scene, "photometric", knowns=FREE, noise=NOISE)
+    alone = locate(channels[0], scene, "photometric", knowns=FREE, noise=NOISE)
+    assert sigmas_off(colour, pose) < 4.0
+    assert np.trace(colour.covariance[:3, :3]) < 0.9 * np.trace(alone.covariance[:3, :3])
+
+
+def test_three_soft_patches_hold_the_tip_that_one_does_not():
+    scene = scene_of(CyclesBeam(), "triple")
+    pose = scene.pose(np.array(TIPS[0]))
+    found = locate(photograph(scene, pose, fundus(0.1), rays=2), scene, "photometric", knowns=FREE, noise=NOISE)
+    assert miss_um(found, pose) < 10.0
+    assert sigmas_off(found, pose) < 4.0
 
 
 def test_three_patches_give_the_tip_and_the_roll():
