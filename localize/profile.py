@@ -115,10 +115,10 @@ class Profile:
         if len(self.knots) == 1:
             x = np.maximum(w - self.knots[0], 0.0)
             lit = w >= self.knots[0]
-            return _polynomial(coefficients[0][:, None], x) * lit
+            return _polynomial(coefficients[0], x) * lit
         piece = np.searchsorted(self.knots, w, side="right") - 1
         x = w - self.knots[np.maximum(piece, 0)]
-        return np.where(piece >= 0, _polynomial(coefficients[np.maximum(piece, 0)].T, x), 0.0)
+        return np.where(piece >= 0, _polynomial(np.moveaxis(coefficients[np.maximum(piece, 0)], -1, 0), x), 0.0)
 
 
 def _polynomial(coefficients: Array, x: Array) -> Array:

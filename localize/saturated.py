@@ -21,7 +21,7 @@ from localize.strips import Strips, score_covariance
 
 Array = NDArray[np.float64]
 #: bins on either side of the outline that are counted: many to find it, few to measure it
-_REACH = (2.0, 2.0, 2.0, 1.0, 1.0, 1.0)
+_REACH = (2.0, 2.0, 1.0, 0.5, 0.4, 0.3, 0.3)
 _BAND = 5.0  # bins looked at on either side
 #: a spotlight on the retina over the ambient light there, and the spread of its logarithm: usual powers and distances
 _CONTRAST, _CONTRAST_SPREAD = 1e3, 1.5
@@ -102,8 +102,9 @@ def fit_saturated(
         counted = (np.abs(away) < reach).astype(float)
         displaced = 2.0 * reach * (clipped - np.clip(0.5 - away / (2.0 * reach), 0.0, 1.0))
         columns = np.concatenate([-jacobian.T, rise[None], displaced[None]])
-        means = strips.sums(columns * counted) / np.maximum(strips.sums(counted), 1.0)
-        scatter = max(spread(means[-1]), _SMALLEST)
+        # a strip weighs as much as it has bins that count
+        means = strips.sums(columns * counted) / np.sqrt(np.maximum(strips.sums(counted), 1.0))
+        scatter = max(spread(means[-1][means[-1] != 0.0]), _SMALLEST)
         rows, residual = means[:-1].T / scatter, means[-1] / scatter
         weights = student_weights(residual)
         whole = (rows * weights[:, None]).T @ rows + _contrast_prior(size)

@@ -1,0 +1,181 @@
+"""The edge fit on frames of the image model itself: how near the bound it is, and whether its covariance is honest."""
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from localize import Knowns, SensorNoise
+from localize.edge import fit_edge
+from localize.forward import ambient_irradiance, light, look, moved, window
+from localize.noise import noise_of
+from localize.profile import Profile
+from localize.saturated import SaturatedFit
+from localize.strips import Strips, score_covariance
+from localize.theory import cramer_rao
+from scene import Scene
+from scene.beam import CyclesBeam, HardBeam, LinearBeam
+from scene.camera import Camera
+from scene.sensor import Linear, Srgb8
+from scene.surface import Surface
+
+PEAK, AMBIENT, READ = 9000.0, 200.0, 15.0
+NOISE = SensorNoise(levels=4095, electrons=1.25 * PEAK, read=READ)
+TIPS = np.array([[1.0, 0.5, 4.0], [-1.5, -1.0, 3.0], [0.4, -2.0, 4.5], [-0.6, 1.2, 5.0]])
+
+
+def radiance(scene, pose, albedo=lambda points: 1.0):
+    """Where the patch is (row, column), and its ambient and its spotlight radiance `[h, w]`, both times the albedo."""
+    low, high = (
+        f(scene.camera.project(scene.outline(pose, 0)), axis=0).astype(int) + margin
+        for f, margin in ((np.min, -12), (np.max, 12))
+    )
+    size = high - low
+    sight = look(scene, window(low[1], low[0], size[1], size[0]))
+    colour = albedo(sight.points)
+    spot = light(sight, pose, scene, Profile.of(scene.beam)).value
+    shape = (size[1], size[0])
+    return low[::-1], (colour * ambient_irradiance(sight, scene)).reshape(shape), (colour * spot).reshape(shape)
+
+
+def counted(scene, pose, seed, albedo=lambda points: 1.0):
+    """A 12-bit frame with shot and read noise; only around the patch is anything shown."""
+    corner, ambient, spot = radiance(scene, pose, albedo)
+    rng = np.random.default_rng(seed)
+    electrons = AMBIENT * ambient + PEAK * spot / np.quantile(spot, 0.998)
+    electrons = rng.poisson(electrons) + READ * rng.standard_normal(electrons.shape)
+    return placed(scene, corner, np.clip(np.round(electrons / (1.25 * PEAK) * 4095.0), 0, 4095).astype(np.uint16))
+
+
+def clipped(scene, pose, contrast, ambient_level=0.02, albedo=lambda points: 1.0):
+    """An 8-bit sRGB frame on which the spotlight is `contrast` times the ambient light, cut off at white."""
+    corner, ambient, spot = radiance(scene, pose, albedo)
+    lit = np.clip(ambient_level * (ambient + contrast * spot / spot.max()), 0.0, 1.0)
+    code = np.where(lit <= 0.0031308, 12.92 * lit, 1.055 * np.maximum(lit, 1e-9) ** (1.0 / 2.4) - 0.055)
+    return placed(scene, corner, np.round(255.0 * code).astype(np.uint8))
+
+
+def placed(scene, corner, cut):
+    image = np.full((scene.camera.resolution,) * 2, np.median(cut[0]), cut.dtype)
+    image[corner[0] : corner[0] + cut.shape[0], corner[1] : corner[1] + cut.shape[1]] = cut
+    return image
+
+
+def near(pose, seed, step=(0.02, 0.02, 0.03, 1e-3, 1e-3)):
+    return SimpleNamespace(pose=moved(pose, np.random.default_rng(seed).choice([-1.0, 1.0], 5) * np.array(step)))
+
+
+def error(fit, pose):
+    return 1e3 * float(np.linalg.norm(fit.estimate.pose.apex - pose.apex))
+
+
+def chi_square(fit, pose):
+    off = fit.estimate.pose.apex - pose.apex
+    return float(off @ np.linalg.solve(fit.covariance[:3, :3], off))
+
+
+def vessels(points):
+    """Albedo with dark stripes a quarter of a millimetre apart."""
+    return 1.0 - 0.4 * np.exp(-np.square(np.sin(12.0 * points[:, 0] + 3.0 * points[:, 1])) / 0.05)
+
+
+@pytest.mark.parametrize("beam", [HardBeam(), CyclesBeam()], ids=["hard", "soft"])
+def test_over_a_uniform_retina_the_error_is_near_the_bound_and_stated(beam):
+    scene = Scene(beam=beam, camera=Camera(resolution=1000), sensor=Linear(bits=12))
+    errors, bounds, chi = [], [], []
+    for k, tip in enumerate(TIPS):
+        pose = scene.pose(tip)
+        bounds += [1e3 * cramer_rao(scene, pose, knowns=Knowns(rcm_sigma_mm=0.01)).position_mm] * 10
+        for seed in range(10):
+            fit = fit_edge(counted(scene, pose, 100 * k + seed), scene, near(pose, seed), Knowns(0.01), NOISE)
+            errors.append(error(fit, pose))
+            chi.append(chi_square(fit, pose))
+            assert fit.settled
+    ratio = np.sqrt(np.mean(np.square(errors)) / np.mean(np.square(bounds)))
+    assert ratio < 1.5
+    assert np.mean(np.array(chi) < 7.815) >= 0.85
+    assert np.mean(chi) > 0.3 * 3.0
+
+
+def test_vessels_across_a_hard_edge_widen_the_covariance_and_stay_inside_it():
+    scene = Scene(beam=HardBeam(), camera=Camera(resolution=1000), sensor=Linear(bits=12))
+    pose = scene.pose(TIPS[0])
+    plain = fit_edge(counted(scene, pose, 1), scene, near(pose, 1), Knowns(None), NOISE)
+    striped = fit_edge(counted(scene, pose, 1, vessels), scene, near(pose, 1), Knowns(None), NOISE)
+    assert np.trace(striped.covariance[:3, :3]) > np.trace(plain.covariance[:3, :3])
+    assert chi_square(striped, pose) < 11.3
+
+
+@pytest.mark.parametrize("contrast", [300.0, 3000.0])
+def test_a_sharp_patch_clipped_throughout_is_measured_by_its_clipped_pixels(contrast):
+    scene = Scene(beam=HardBeam(), camera=Camera(resolution=1000), sensor=Srgb8())
+    for k, tip in enumerate(TIPS):
+        pose = scene.pose(tip)
+        fit = fit_edge(clipped(scene, pose, contrast), scene, near(pose, k), Knowns(0.01), noise_of(scene))
+        assert isinstance(fit, SaturatedFit)
+        assert fit.settled
+        assert error(fit, pose) < 15.0
+        assert chi_square(fit, pose) < 11.3
+
+
+def test_channels_that_clip_at_different_places_are_fitted_jointly():
+    scene = Scene(beam=CyclesBeam(), camera=Camera(resolution=1000), sensor=Srgb8())
+    pose = scene.pose(TIPS[1])
+    contrasts = (2000.0, 500.0, 60.0)
+    colour = np.stack([clipped(scene, pose, c, albedo=vessels) for c in contrasts], axis=-1)
+    fit = fit_edge(colour, scene, near(pose, 2), Knowns(0.01), noise_of(scene))
+    assert len(fit.gains) == 3
+    assert np.all(np.diff(fit.gains) < 0.0)
+    assert error(fit, pose) < 5.0
+
+
+def test_an_unknown_bump_under_the_outline_moves_the_tip_by_a_few_micrometres():
+    rough = Scene(beam=HardBeam(), camera=Camera(resolution=1000), sensor=Linear(bits=12), surface="bumps")
+    smooth = rough.model_copy(update={"surface": Surface()})
+    pose = smooth.pose(np.array([-1.72, 0.07, 2.87]))
+    displaced = np.linalg.norm(
+        rough.camera.project(rough.outline(pose, 0)) - smooth.camera.project(smooth.outline(pose, 0)), axis=1
+    )
+    assert displaced.max() > 0.5
+    fit = fit_edge(counted(rough, pose, 3), smooth, near(pose, 3), Knowns(0.01), NOISE)
+    assert error(fit, pose) < 5.0
+    assert chi_square(fit, pose) < 11.3
+
+
+@pytest.mark.parametrize("red", [0.0, 0.9])
+def test_the_covariance_of_correlated_strips_holds_for_the_harmonics_the_fit_takes_away(red):
+    rng = np.random.default_rng(4)
+    count, angle = 160, np.arange(160) * 2.0 * np.pi / 160
+    rows = np.stack([np.ones(count), np.cos(angle), np.sin(angle)], axis=1)
+    parts = np.einsum("sp,sq->spq", rows, rows)
+    strips = Strips(np.arange(count), np.zeros(count), np.arange(count), (slice(0, count),))
+    spectrum = 1.0 / np.abs(1.0 - red * np.exp(1j * angle)) ** 2
+    chi = []
+    for _ in range(150):
+        series = np.real(np.fft.ifft(np.fft.fft(rng.standard_normal(count)) * np.sqrt(spectrum)))
+        step = np.linalg.solve(rows.T @ rows, rows.T @ series)
+        meat = score_covariance(strips, (series - rows @ step)[:, None] * rows, parts)
+        covariance = np.linalg.solve(rows.T @ rows, np.linalg.solve(rows.T @ rows, meat).T)
+        chi.append(step @ np.linalg.solve(covariance, step) / 3.0)
+    assert 0.6 < np.mean(chi) < 1.6
+
+
+@given(
+    st.sampled_from([HardBeam(), CyclesBeam(), LinearBeam()]),
+    st.floats(-0.2, 1.2),
+    st.floats(0.01, 0.3),
+    st.floats(0.01, 0.3),
+)
+def test_a_pixels_mean_of_the_profile_is_its_integral(beam, where, wide, high):
+    profile = Profile.of(beam)
+    span = profile.knots[-1] - profile.knots[0] if len(profile.knots) > 1 else 1e-3
+    w, p, q = (np.array([x]) for x in (profile.knots[0] + where * span, wide * span, high * span))
+    mean, slope = profile.mean(w, p, q)
+    nodes = (np.arange(400) + 0.5) / 200.0 - 1.0
+    offsets = (wide * nodes[:, None] + high * nodes) * span
+    assert abs(mean[0] - profile.value(w[0] + offsets).mean()) < 2e-3
+    step = 1e-5 * span
+    sides = [profile.mean(w + s, p, q)[0][0] for s in (step, -step)]
+    assert slope[0] * span == pytest.approx((sides[0] - sides[1]) / 2e-5, rel=2e-2, abs=2e-2)
