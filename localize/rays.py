@@ -56,17 +56,19 @@ class Rays:
         return self.middle + (1.0 + shift)[:, None] * (self.ends - self.middle), worth
 
 
-def support(seen: Sequence[Rays]) -> tuple[float, float]:
-    """What the outlines as they are explain: the mean share of a ray's gradients, 0 to 1, and their mean sum.
+def support(seen: Sequence[Rays]) -> tuple[float, float, float]:
+    """What the outlines as they are explain of the gradients along the rays; a ray that sees another counts 0.
 
-    A ray that sees another outline counts 0. The sum is what a ray adds to the log-likelihood.
+    The mean share, the share that a quarter of the rays exceed, and the mean sum, which is what a ray adds to the
+    log-likelihood.
     """
     middle = len(SHIFTS) // 2
     total = np.concatenate([rays.total for rays in seen])
     left = np.concatenate([rays.left for rays in seen])
     here = np.abs(np.argmin(left, axis=1) - middle) <= 1
     explained = here * np.maximum(total - left[:, middle], 0.0)
-    return float(np.mean(explained / np.maximum(total, 1e-6))), float(np.mean(explained))
+    share = explained / np.maximum(total, 1e-6)
+    return float(np.mean(share)), float(np.quantile(share, 0.75)), float(np.mean(explained))
 
 
 def rays_across(overview: Overview, scene: Scene, pose: Pose, *, thorough: bool = False) -> list[Rays]:

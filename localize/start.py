@@ -40,7 +40,8 @@ _STILL_MM = 0.01
 _LEAST_WORTH = 0.2  # share of a ray's gradients that says where the outline is
 #: share of the gradients that a patch explains where nothing else is bright; a disc may explain nearly as much
 CONVINCING = 0.6
-_LEAST = 0.25
+#: what crosses a rim hides it on some rays only: a quarter of them must see more of the beam's edge than of all else
+_CLEAR = 0.52
 #: share of the best pose's evidence with which another one may be right: after a convincing one, and otherwise
 #: where the two touch, so that each hides part of the other's outline, or lie apart
 _AS_GOOD, _TOUCHING, _APART = 0.8, 0.25, 0.5
@@ -55,6 +56,7 @@ class Start:
 
     pose: Pose
     explained: float  #: share of the log light's gradients across the outlines that the cones explain, 0 to 1
+    clearest: float  #: share that a quarter of the rays across the outlines exceed
     evidence: float  #: their sum along a ray, what it adds to the log-likelihood
 
     def near(self, pose: Pose, scene: Scene, share: float) -> bool:
@@ -104,7 +106,7 @@ def find_starts(
         found = _merged([*found, *_turned(overview, scene, found[0])])
     for start in found[:_FITTED]:
         share = _AS_GOOD if found[0].explained > CONVINCING else _TOUCHING if start.touches(found[0], scene) else _APART
-        if start.explained > _LEAST and start.evidence >= share * found[0].evidence:
+        if start.clearest > _CLEAR and start.evidence >= share * found[0].evidence:
             yield start
 
 

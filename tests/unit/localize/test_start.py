@@ -165,9 +165,11 @@ def test_an_even_frame_has_no_start(beam, grey):
     assert find_start(np.clip(noise, 0, 4095).astype(np.uint16), scene_of(beam)) == NOTHING
 
 
-def test_a_retina_without_a_patch_has_no_start():
-    scene = scene_of()
-    assert find_start(frame(scene, None), scene) == NOTHING
+@pytest.mark.parametrize("beam", ["hard", "soft"])
+@pytest.mark.parametrize("disc", [1.0, 20.0])
+def test_a_retina_without_a_patch_has_no_start_whatever_its_disc(beam, disc):
+    scene = scene_of(beam)
+    assert find_start(frame(scene, None, disc=disc), scene) == NOTHING
 
 
 def test_the_best_start_comes_first_and_no_two_are_the_same():
@@ -208,7 +210,7 @@ def test_the_true_pose_explains_more_than_any_beside_it():
     for step in np.vstack([np.eye(3), -np.eye(3)]) * 0.25:
         there = support(rays_across(overview, scene, scene.pose(pose.apex + step)))
         assert there[0] < here[0]
-        assert there[1] < here[1]
+        assert there[2] < here[2]
 
 
 def located(pose):
@@ -219,7 +221,7 @@ def test_a_fit_that_leaves_the_light_it_started_from_is_refused():
     scene = scene_of()
     pose = scene.pose(np.array(TIPS[0]))
     away = scene.pose(np.array(TIPS[0]) + [0.0, 0.3, 0.0])
-    start = Start(pose, 0.8, 3.0)
+    start = Start(pose, 0.8, 0.9, 3.0)
     assert believed([start], scene, lambda _: located(pose))
     assert believed([start], scene, lambda _: located(away)) == LocalizationFailure(ELSEWHERE)
 
@@ -232,8 +234,8 @@ def test_the_next_start_counts_only_where_none_is_convincing():
     def second_only(start):
         return located(start.pose) if start.pose is poses[1] else refused
 
-    assert believed([Start(poses[0], 0.8, 3.0), Start(poses[1], 0.7, 2.9)], scene, second_only) == refused
-    found = believed([Start(poses[0], 0.4, 3.0), Start(poses[1], 0.4, 2.9)], scene, second_only)
+    assert believed([Start(poses[0], 0.8, 0.9, 3.0), Start(poses[1], 0.7, 0.9, 2.9)], scene, second_only) == refused
+    found = believed([Start(poses[0], 0.4, 0.9, 3.0), Start(poses[1], 0.4, 0.9, 2.9)], scene, second_only)
     assert isinstance(found, Localization)
     np.testing.assert_array_equal(found.apex_mm, poses[1].apex)
     assert believed([], scene, second_only) == LocalizationFailure(NOTHING)
@@ -241,5 +243,5 @@ def test_the_next_start_counts_only_where_none_is_convincing():
 
 def test_two_believed_answers_that_differ_are_none():
     scene = scene_of()
-    starts = [Start(scene.pose(np.array(tip)), 0.4, 1.0) for tip in TIPS[:2]]
+    starts = [Start(scene.pose(np.array(tip)), 0.4, 0.9, 1.0) for tip in TIPS[:2]]
     assert believed(starts, scene, lambda start: located(start.pose)) == LocalizationFailure(TWO_PLACES)
