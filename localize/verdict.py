@@ -16,6 +16,7 @@ UNCERTAIN = "too uncertain: the patch and what is known do not hold the tip with
 MISSES_RCM = "the axis misses the remote centre of motion by more than both their errors allow"
 MISFIT = "the light in the patch contradicts the model of the beam"
 OUTSIDE = "the fitted tip is outside the eye"
+BEHIND = "the fitted tip is behind the remote centre of motion"
 COVERED = "too little of the patch is in the frame"
 UNSETTLED = "the fit does not settle"
 #: largest sigma of the tip that is returned [mm]; a free fit may run off along what it hardly sees, a tied one cannot
@@ -48,6 +49,9 @@ def judged(
         return LocalizationFailure(COVERED)
     if nominal.depth(estimate.pose.apex) <= 0.0:
         return LocalizationFailure(OUTSIDE)
+    inwards = estimate.pose.apex - np.asarray(nominal.instrument.rcm)
+    if float(inwards @ estimate.pose.axis) <= 0.0:
+        return LocalizationFailure(BEHIND)
     size = 6 if len(nominal.spotlights) > 1 else 5
     covariance = _inverse(information)
     if covariance is None:
