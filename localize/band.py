@@ -171,7 +171,7 @@ class BandFit:
 def fit_band(
     image: NDArray[np.generic],
     start: Estimate,
-    gains: tuple[float, ...],
+    before: BandFit | None,
     knowns: Knowns,
     noise: NoiseModel,
     *,
@@ -185,9 +185,10 @@ def fit_band(
 ) -> BandFit | None:
     """Fit the pose to bins of `side` x `side` px from `inner` bins inside the outlines to `outer` bins outside.
 
-    A step shorter than `enough` sigmas of uncorrelated residuals ends the iterations. `gains` may be empty: then they
-    are measured. With `tied` the axis stays on the RCM. `unlit` tells the albedo as
-    far as it shows it. None if too little of the outlines is in the frame or the equations are singular.
+    Gain and spreads of the albedo start from those of the fit `before`, or from the band itself and a usual retina. A
+    step shorter than `enough` sigmas of uncorrelated residuals ends the iterations. With `tied` the axis stays on the
+    RCM. `unlit` tells the albedo as far as it shows it. None if too little of the outlines is in the frame or the
+    equations are singular.
     """
     nominal, estimate = start.scene, start
     roll = len(nominal.spotlights) > 1
@@ -206,8 +207,12 @@ def fit_band(
         light, rows = spotlight_irradiance(sight, estimate, knowns, band.pixels, side, roll=roll)
         if turn == 0:
             for c, shown in enumerate(band.shown):
-                gain = gains[c] if gains else _first_gain(shown, irradiance, light, band.strips.offset)
-                spread = np.array([_LEVEL, _SLOPE_PER_MM * pitch])
+                if before is None:
+                    gain = _first_gain(shown, irradiance, light, band.strips.offset)
+                    spread = np.array([_LEVEL, _SLOPE_PER_MM * pitch])
+                else:
+                    gain = before.channels[c].gain
+                    spread = before.channels[c].spread * [1.0, side / math.sqrt(before.channels[c].bins)]
                 smallest = np.array([_SMALLEST, _SMALLEST / (inner + outer)])
                 channels.append(_Channel(shown, band.strips, noise, side**2, gain, spread, smallest))
         pr, pj = prior_rows(estimate, nominal, used, pose_size)

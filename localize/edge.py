@@ -22,7 +22,7 @@ _CLIPPED = ((40, 8.0, 3.0, 6), (130, 20.0, 4.0, 5))
 #: a sharp edge and a clipped patch's rim end at full resolution
 _FULL = (1, 5.0, 3.0, 8)
 #: a step this short [sigmas] ends a stage that others follow, and the last one
-_ENOUGH = (1.0, 0.1)
+_ENOUGH = (1.0, 0.3)
 _SATURATED = (30, 90)  # bins across a patch that is clipped throughout, before full resolution
 
 EdgeFit = BandFit | SaturatedFit
@@ -76,16 +76,15 @@ def fit_edge(
     if full:
         stages = [stage for stage in stages if stage[0] > 1]
         stages.append(_FULL)
-    gains: tuple[float, ...] = ()
     fit: BandFit | None = None
     for number, (side, inner, outer, iterations) in enumerate(stages):
         fit = fit_band(
-            image, estimate, gains, knowns, noise,
+            image, estimate, fit, knowns, noise,
             side=side, inner=inner, outer=outer, iterations=iterations,
             enough=_ENOUGH[number + 1 == len(stages)], tied=number == 0, unlit=unlit,
         )  # fmt: skip
         if fit is None:
             return UNCERTAIN if number else COVERED
-        estimate, gains = fit.estimate, fit.gains
+        estimate = fit.estimate
     assert fit is not None
     return fit
