@@ -20,9 +20,10 @@ def _chroma(lead: Channel, others: list[Channel]) -> Array:
     found = np.zeros((len(others), *lead.signal.shape))
     for plane, other in zip(found, others, strict=True):
         # a little smoother than the bins, or their noise would hide what the channels have in common
-        a, b = (np.maximum(cv2.GaussianBlur(c.signal, (0, 0), 1.0), 0.05 * np.median(c.signal)) for c in (other, lead))
+        smooth = [cv2.GaussianBlur(channel.signal, (0, 0), 1.0) for channel in (other, lead)]
+        a, b = (np.maximum(signal, max(0.05 * float(np.median(signal)), 1e-6)) for signal in smooth)
         ratio = np.log(a / b) - other.template + lead.template
-        known = lead.usable & other.usable & np.isfinite(ratio)
+        known = lead.usable & other.usable
         plane[known] = ratio[known] - (np.median(ratio[known]) if known.any() else 0.0)
     return found
 
