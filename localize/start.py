@@ -42,6 +42,8 @@ _LEAST_WORTH = 0.2  # share of a ray's gradients that says where the outline is
 CONVINCING = 0.6
 #: what crosses a rim hides it on some rays only: a quarter of them must see more of the beam's edge than of all else
 _CLEAR = 0.52
+#: log light that all rays together must see in the mean, and the share of it: the retina's own mottle stays below
+_FAINTEST, _LEAST = 0.3, 0.25
 #: share of the best pose's evidence with which another one may be right: after a convincing one, and otherwise
 #: where the two touch, so that each hides part of the other's outline, or lie apart
 _AS_GOOD, _TOUCHING, _APART = 0.8, 0.25, 0.5
@@ -58,6 +60,11 @@ class Start:
     explained: float  #: share of the log light's gradients across the outlines that the cones explain, 0 to 1
     clearest: float  #: share that a quarter of the rays across the outlines exceed
     evidence: float  #: their sum along a ray, what it adds to the log-likelihood
+
+    @property
+    def stands_out(self) -> bool:
+        """Whether it may be a spotlight's light at all."""
+        return self.clearest > _CLEAR and self.explained > _LEAST and self.evidence > _FAINTEST
 
     def near(self, pose: Pose, scene: Scene, share: float) -> bool:
         """Whether the outlines of `pose` are within a `share` of their radius of where the start found them."""
@@ -106,7 +113,7 @@ def find_starts(
         found = _merged([*found, *_turned(overview, scene, found[0])])
     for start in found[:_FITTED]:
         share = _AS_GOOD if found[0].explained > CONVINCING else _TOUCHING if start.touches(found[0], scene) else _APART
-        if start.clearest > _CLEAR and start.evidence >= share * found[0].evidence:
+        if start.evidence >= share * found[0].evidence and start.stands_out:
             yield start
 
 

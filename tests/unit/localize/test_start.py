@@ -172,6 +172,14 @@ def test_a_retina_without_a_patch_has_no_start_whatever_its_disc(beam, disc):
     assert find_start(frame(scene, None, disc=disc), scene) == NOTHING
 
 
+def test_what_the_retinas_own_mottle_shows_is_no_light():
+    pose = scene_of().pose(np.array(TIPS[0]))
+    assert Start(pose, 0.5, 0.7, 1.0).stands_out
+    assert not Start(pose, 0.5, 0.4, 1.0).stands_out
+    assert not Start(pose, 0.2, 0.7, 1.0).stands_out
+    assert not Start(pose, 0.5, 0.7, 0.15).stands_out
+
+
 def test_the_best_start_comes_first_and_no_two_are_the_same():
     scene = scene_of("half soft")
     pose = scene.pose(np.array([DISC[0] - 0.9, DISC[1] - 1.2, 5.0]))
