@@ -96,7 +96,8 @@ class Modes:
         for octave in reversed(range(_OCTAVES)):
             finer = float((power[octave] + _SHARED * finer) / (determined[octave] + _SHARED))
             found[octave] = finer
-        return np.clip(found, *_AMPLITUDE_RANGE)
+        # the fixed point is slow where there is nothing to find
+        return np.clip(found * np.minimum(1.0, found / amplitudes), *_AMPLITUDE_RANGE)
 
 
 @dataclass(frozen=True)
