@@ -16,9 +16,8 @@ from localize.view import Unlit, outlines
 from scene.scene import Scene
 
 #: bins across the patch, bins inside and outside the outline, iterations
-_SHARP = ((30, 3.0, 3.0, 6), (70, 4.0, 4.0, 4))
+_RIM = ((30, 5.0, 3.0, 6), (70, 5.0, 3.0, 5))
 _SOFT = ((30, 6.0, 2.0, 6), (40, 14.0, 3.0, 10))
-_CLIPPED = ((40, 8.0, 3.0, 6), (130, 20.0, 4.0, 5))
 #: a sharp edge and a clipped patch's rim end at full resolution
 _FULL = (1, 5.0, 3.0, 8)
 #: a step this short [sigmas] ends a stage that others follow, and the last one
@@ -71,8 +70,9 @@ def fit_edge(
         assert saturated is not None
         return saturated
     full = sharp or clipped
-    plan = _SOFT if not full else _SHARP if sharp else _CLIPPED
-    stages = [(max(1, int(size / bins)), inner, outer, turns) for bins, inner, outer, turns in plan]
+    stages = [
+        (max(1, int(size / bins)), inner, outer, turns) for bins, inner, outer, turns in (_RIM if full else _SOFT)
+    ]
     if full:
         stages = [stage for stage in stages if stage[0] > 1]
         stages.append(_FULL)

@@ -12,7 +12,8 @@ Array = NDArray[np.float64]
 WIDTH = 2.0  # of a strip along the outline [bins]
 #: harmonics of the outline that the pose changes: what a fit leaves of them says nothing of what they were
 _FITTED = 3
-_KNEES = np.array([1.0, 2.0, 4.0, 8.0, 16.0, 32.0])  # harmonics above which neighbouring strips err independently
+#: harmonics above which neighbouring strips err independently; the last: all do
+_KNEES = np.array([1.0, 2.0, 4.0, 8.0, 16.0, 32.0, np.inf])
 
 
 @dataclass(frozen=True)
@@ -165,6 +166,8 @@ def _power(series: Array) -> Array:
         weight = number / np.square(model)
         amounts = amounts * (weight * observed * both).sum(axis=3) / (weight * model * both).sum(axis=3)
     cost = np.sum(number * (np.log(model) + observed / model), axis=2)
+    # a second parameter is worth its cost (Akaike)
+    cost = cost + np.isfinite(_KNEES)
     share = np.exp(cost.min(axis=1, keepdims=True) - cost)
     white, red = amounts * share / share.sum(axis=1, keepdims=True)
     smooth = white.sum(axis=1)[:, None] + red @ (1.0 / (1.0 + np.square(harmonic / _KNEES[:, None])))
