@@ -34,7 +34,7 @@ def is_sharp(scene: Scene) -> bool:
 
 def is_clipped(image: NDArray[np.generic], scene: Scene, start: Start) -> bool:
     """Whether most of the middle of the patch is clipped, so that only its rim can be measured."""
-    points = outlines(Estimate.at(start.pose, scene))
+    points = outlines(Estimate(start.pose, scene))
     if not len(points):
         return False
     column, row = np.round(points.mean(axis=0)).astype(int)
@@ -53,13 +53,13 @@ def fit_edge(
     unlit: Unlit | None = None,
 ) -> EdgeFit | str:
     """The band fit, coarse to fine, or why there is none."""
-    points = outlines(Estimate.at(start.pose, scene))
+    points = outlines(Estimate(start.pose, scene))
     if len(points) < 10:
         return COVERED
     spotlights = len(scene.spotlights)
     size = float(np.max(np.ptp(points, axis=0))) / (1.0 if spotlights == 1 else 2.0)
     sharp, clipped = is_sharp(scene), is_clipped(image, scene, start)
-    estimate = Estimate.at(start.pose, scene)
+    estimate = Estimate(start.pose, scene)
     if sharp and clipped:
         saturated: SaturatedFit | None = None
         for number, side in enumerate([side for side in (int(size / bins) for bins in _SATURATED) if side > 1] + [1]):

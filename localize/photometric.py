@@ -64,7 +64,7 @@ def fit_patch(
     unlit: Unlit | None,
 ) -> FieldFit | str:
     """The field fit, coarse to fine, or why there is none."""
-    estimate = Estimate.at(start.pose, scene)
+    estimate = Estimate(start.pose, scene)
     fit: FieldFit | None = None
     for number, (bins, iterations, tied) in enumerate(_LEVELS):
         fit = fit_field(image, estimate, fit, knowns, noise, bins=bins, iterations=iterations, tied=tied, unlit=unlit)

@@ -92,16 +92,6 @@ class Estimate:
     pose: Pose
     scene: Scene
 
-    @classmethod
-    def at(cls, pose: Pose, scene: Scene) -> Estimate:
-        """The estimate with the scene's own values."""
-        return cls(pose, scene)
-
-    @property
-    def half_angle(self) -> float:
-        """The beam's half angle [rad]."""
-        return self.scene.beam.half_angle
-
     @property
     def profile(self) -> Profile:
         """The beam's profile."""

@@ -192,7 +192,7 @@ def _differ(a: Pose, b: Pose) -> bool:
 
 def _settle(overview: Overview, scene: Scene, pose: Pose, *, thorough: bool) -> Start | None:
     """The pose near `pose` whose outlines the rays see; None where there is none."""
-    estimate = Estimate.at(pose, scene)
+    estimate = Estimate(pose, scene)
     for turn in range(_TURNS + 1):
         seen = rays_across(overview, scene, estimate.pose, thorough=thorough)
         if not seen:
@@ -242,9 +242,9 @@ def _towards(estimate: Estimate, pixels: Array, spots: NDArray[np.intp], worth: 
         return None
     through = Pose.through(tip, rcm)
     if not roll:
-        return Estimate.at(through, scene)
+        return Estimate(through, scene)
     turned = moved(pose, np.array([*step[:3], u @ step[:3] / length, v @ step[:3] / length, step[3]]))
-    return Estimate.at(Pose(tip, through.axis, turned.roll), scene)
+    return Estimate(Pose(tip, through.axis, turned.roll), scene)
 
 
 def nearest_outline(pixels: Array, estimate: Estimate) -> tuple[NDArray[np.intp], NDArray[np.bool_]]:
@@ -252,7 +252,7 @@ def nearest_outline(pixels: Array, estimate: Estimate) -> tuple[NDArray[np.intp]
     to = look(estimate.scene, pixels).points - estimate.pose.apex
     to /= np.linalg.norm(to, axis=1, keepdims=True)
     axes = spotlight_axes(estimate.pose, estimate.scene.spotlights)
-    off = np.arccos(np.clip(to @ axes.T, -1.0, 1.0)) - estimate.half_angle
+    off = np.arccos(np.clip(to @ axes.T, -1.0, 1.0)) - estimate.scene.beam.half_angle
     nearest = np.argmin(np.abs(off), axis=1)
     others = off.copy()
     others[np.arange(len(off)), nearest] = math.inf

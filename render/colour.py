@@ -12,8 +12,6 @@ from scene import Pose, Scene
 from scene.spectrum import Curve
 
 _NAMES = ("x_bar", "y_bar", "z_bar")
-#: luminous efficacy [lm/W]: y_bar weighted radiance times this is luminance [cd/m2]
-EFFICACY = 683.0
 #: no preview is brightened beyond this white [W m-2 sr-1], 7 cd/m2: an infrared scene is dark, as to the eye
 DARKEST_WHITE = 0.01
 

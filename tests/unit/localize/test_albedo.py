@@ -79,7 +79,7 @@ def test_noise_that_neighbours_share_counts_once():
 
 def test_a_bin_between_three_patches_counts_in_one_window_only():
     scene = Scene(spotlights="triple", camera=Camera(resolution=1000))
-    estimate = Estimate.at(scene.pose(np.array([1.0, 0.5, 4.0])), scene)
+    estimate = Estimate(scene.pose(np.array([1.0, 0.5, 4.0])), scene)
     count = np.zeros((1000, 1000), int)
     for spotlight in range(3):
         at = Window.around(estimate, spotlight, 1000, 0.15)

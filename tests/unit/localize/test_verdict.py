@@ -29,7 +29,7 @@ FINE = {"misfit": 1.0, "covered": 1.0, "settled": True}
 
 
 def verdict(pose=None, sigmas=SIGMAS, inflation=1.0, knowns=Knowns(0.01), scene=Scene(), **more):  # noqa: B008
-    estimate = Estimate.at(scene.pose(TIP) if pose is None else pose, scene)
+    estimate = Estimate(scene.pose(TIP) if pose is None else pose, scene)
     return judged(estimate, np.diag(1.0 / np.square(sigmas)), inflation, scene, knowns, **{**FINE, **more})
 
 
@@ -53,7 +53,7 @@ def test_quantities_beside_the_pose_are_in_the_covariance_and_left_out_of_it():
     information = np.diag(1.0 / np.square([*SIGMAS, 1e-3]))
     information[2, 5] = information[5, 2] = 0.6 * math.sqrt(information[2, 2] * information[5, 5])
     scene, knowns = Scene(), Knowns(0.01, half_angle_sigma_deg=0.05)
-    found = judged(Estimate.at(scene.pose(TIP), scene), information, 1.0, scene, knowns, **FINE)
+    found = judged(Estimate(scene.pose(TIP), scene), information, 1.0, scene, knowns, **FINE)
     assert found.covariance.shape == (5, 5)
     assert math.sqrt(found.covariance[2, 2]) == pytest.approx(SIGMAS[2] / 0.8, rel=1e-3)
 
