@@ -22,6 +22,7 @@ _SOFT = ((30, 6.0, 2.0, 6), (40, 14.0, 3.0, 10))
 _FULL = (1, 5.0, 3.0, 8)
 #: a step this short [sigmas] ends a stage that others follow, and the last one
 _ENOUGH = (1.0, 0.3)
+_THROUGHOUT = 0.9  # share from which on a patch counts as clipped throughout
 _SATURATED = (30, 90)  # bins across a patch that is clipped throughout, before full resolution
 
 EdgeFit = BandFit | SaturatedFit
@@ -32,8 +33,8 @@ def is_sharp(scene: Scene) -> bool:
     return Profile.of(scene.beam).angle_at(0.5) > 0.97 * scene.beam.half_angle
 
 
-def is_clipped(image: NDArray[np.generic], scene: Scene, start: Start) -> bool:
-    """Whether most of the middle of the patch is clipped, so that only its rim can be measured."""
+def is_clipped(image: NDArray[np.generic], scene: Scene, start: Start, *, share: float = 0.3) -> bool:
+    """Whether more than a `share` of the middle of the patch is clipped, so that only its rim can be measured."""
     points = outlines(Estimate(start.pose, scene))
     if not len(points):
         return False
@@ -41,7 +42,7 @@ def is_clipped(image: NDArray[np.generic], scene: Scene, start: Start) -> bool:
     reach = max(2, int(0.2 * np.min(np.ptp(points, axis=0))))
     cut = image[max(0, row - reach) : row + reach, max(0, column - reach) : column + reach]
     stride = max(1, reach // 16)
-    return bool(cut.size and np.mean(linear_light(cut[::stride, ::stride], scene)[1]) > 0.3)
+    return bool(cut.size and np.mean(linear_light(cut[::stride, ::stride], scene)[1]) > share)
 
 
 def fit_edge(
@@ -60,7 +61,7 @@ def fit_edge(
     size = float(np.max(np.ptp(points, axis=0))) / (1.0 if spotlights == 1 else 2.0)
     sharp, clipped = is_sharp(scene), is_clipped(image, scene, start)
     estimate = Estimate(start.pose, scene)
-    if sharp and clipped:
+    if sharp and is_clipped(image, scene, start, share=_THROUGHOUT):
         saturated: SaturatedFit | None = None
         for number, side in enumerate([side for side in (int(size / bins) for bins in _SATURATED) if side > 1] + [1]):
             saturated = fit_saturated(image, estimate, knowns, side=side, tied=number == 0)

@@ -17,14 +17,13 @@ from localize.outline import distances, outline_problem
 from localize.prior import Estimate, Knowns
 from localize.ribbon import Ribbon
 from localize.solve import reduction, solved, spread, student_bend, student_weights
-from localize.strips import Strips, score_covariance
+from localize.strips import WIDTH, Strips, score_covariance
+from localize.view import Channel
 
 Array = NDArray[np.float64]
 #: bins on either side of the outline that are counted: many to find it, few to measure it
 _REACH = (2.0, 2.0, 1.0, 0.5, 0.4, 0.3, 0.3)
 _BAND = 5.0  # bins looked at on either side
-#: a spotlight on the retina over the ambient light there, and the spread of its logarithm: usual powers and distances
-_CONTRAST, _CONTRAST_SPREAD = 1e3, 1.5
 _SMALLEST = 0.02  # scatter of a strip [bins]
 
 
@@ -39,6 +38,7 @@ class SaturatedFit:
     strips: Strips
     rows: Array  #: displacement of each strip by the parameters and the log contrast, whitened `[S, P + 1]`
     residual: Array  #: displacements, whitened `[S]`
+    contrast_spread: float  #: prior sigma of the log contrast
     covered: float  #: share of the outlines in the frame
     misfit: float = 1.0  #: the scatter of the strips is their own measure
 
@@ -58,11 +58,11 @@ class SaturatedFit:
         size = len(self.information)
         weights = student_weights(self.residual)
         parts = np.einsum("s,sp,sq->spq", weights, self.rows, self.rows)
-        reduced = reduction(parts.sum(axis=0) + _contrast_prior(size), size)
+        reduced = reduction(parts.sum(axis=0) + _contrast_prior(size, self.contrast_spread), size)
         follows = max(0.3, float(np.sum(weights * student_bend(self.residual)) / np.sum(weights)))
         scores = (weights * self.residual)[:, None] * self.rows @ reduced.T / follows
         meat = score_covariance(self.strips, scores, reduced @ parts @ reduced.T)
-        meat = meat + self.prior.T @ self.prior + reduced @ _contrast_prior(size) @ reduced.T
+        meat = meat + self.prior.T @ self.prior + reduced @ _contrast_prior(size, self.contrast_spread) @ reduced.T
         scale = np.sqrt(np.diag(self.information))
         bread = np.linalg.inv(self.information / np.outer(scale, scale)) / np.outer(scale, scale)
         return np.asarray(bread @ meat @ bread)
@@ -88,9 +88,8 @@ def fit_saturated(
     clipped = np.mean([np.where(c.clipped, 1.0, np.where(c.usable, 0.0, 0.5)) for c in ribbon.shown], axis=0)
     problem = outline_problem(ribbon.pixels, ribbon.spots, float(side), nominal, used, roll=roll)
     normal = _normals(ribbon, estimate, roll=roll)
-    outside = strips.offset > 1.0
-    dark = [np.median(c.signal[c.usable & outside]) if np.any(c.usable & outside) else 1e-3 for c in ribbon.shown]
-    share = np.array([min(0.5, 1.0 / (_CONTRAST * max(float(d), 1e-6))) for d in dark])
+    told = [_share(c, ribbon, normal) for c in ribbon.shown]
+    share, uncertain = np.array([t[0] for t in told]), float(np.mean([t[1] for t in told]))
     beyond = np.mean([_reach_beyond(normal, s) for s in share], axis=0) / side
     rise = np.mean([_reach_beyond(normal, s / 1.5) - _reach_beyond(normal, s * 1.5) for s in share], axis=0)
     rise = rise / (2.0 * math.log(1.5) * side)
@@ -107,9 +106,9 @@ def fit_saturated(
         scatter = max(spread(means[-1][means[-1] != 0.0]), _SMALLEST)
         rows, residual = means[:-1].T / scatter, means[-1] / scatter
         weights = student_weights(residual)
-        whole = (rows * weights[:, None]).T @ rows + _contrast_prior(size)
+        whole = (rows * weights[:, None]).T @ rows + _contrast_prior(size, uncertain)
         slope = rows.T @ (weights * residual)
-        slope[size] -= contrast / _CONTRAST_SPREAD**2
+        slope[size] -= contrast / uncertain**2
         reduced = reduction(whole, size)
         information = reduced @ whole @ reduced.T + pj.T @ pj
         found = solved(information, reduced @ slope - pj.T @ pr)
@@ -118,14 +117,31 @@ def fit_saturated(
         step = found / max(1.0, float(np.max(np.abs(found[:3]))) / 0.5, float(np.max(np.abs(found[3:5]))) / 0.05)
         contrast += float(np.clip((slope[size] - whole[size, :size] @ step) / whole[size, size], -1.0, 1.0))
         estimate = estimate.moved(step, pose_size, knowns.free)
-    return SaturatedFit(estimate, information, pj, step, strips, rows, residual, ribbon.covered)
+    return SaturatedFit(estimate, information, pj, step, strips, rows, residual, uncertain, ribbon.covered)
 
 
-def _contrast_prior(size: int) -> Array:
+def _contrast_prior(size: int, sigma: float) -> Array:
     """Prior information `[size + 1, size + 1]` on the log contrast."""
     prior = np.zeros((size + 1, size + 1))
-    prior[size, size] = _CONTRAST_SPREAD**-2
+    prior[size, size] = sigma**-2
     return prior
+
+
+def _share(shown: Channel, ribbon: Ribbon, normal: Array) -> tuple[float, float]:
+    """Which share of a pixel the beam covers when the pixel clips, and the spread of its logarithm.
+
+    The edge leaves pixels between dark and white in a seam as wide as it moves from covering a tenth of that share to
+    covering it: their number tells.
+    """
+    outside = shown.usable & (ribbon.strips.offset > 2.0)
+    dark = float(np.median(shown.signal[outside])) if outside.any() else 0.0
+    seam = shown.usable & (shown.signal > dark + 0.1 * (1.0 - dark)) & (np.abs(ribbon.strips.offset) < 2.0)
+    number = float(np.count_nonzero(seam))
+    shares = np.geomspace(0.003, 0.9, 40)
+    some = normal[:, :: max(1, normal.shape[1] // 200)]
+    widths = np.array([np.mean(_reach_beyond(some, 0.1 * s) - _reach_beyond(some, s)) for s in shares])
+    width = (number + 0.5) / (ribbon.strips.count * WIDTH)
+    return float(np.interp(width, widths, shares)), 1.0 / math.sqrt(number + 1.0)
 
 
 def _normals(ribbon: Ribbon, estimate: Estimate, *, roll: bool) -> Array:
