@@ -17,9 +17,9 @@ from scene.scene import Scene
 
 #: bins across the patch, bins inside and outside the outline, iterations
 _RIM = ((30, 5.0, 3.0, 6), (70, 5.0, 3.0, 5))
-_SOFT = ((30, 6.0, 2.0, 6), (40, 14.0, 3.0, 10))
+_SOFT = ((30, 6.0, 2.0, 6), (40, 14.0, 3.0, 16))
 #: a sharp edge and a clipped patch's rim end at full resolution
-_FULL = (1, 5.0, 3.0, 8)
+_FULL = (1, 5.0, 3.0, 16)
 #: a step this short [sigmas] ends a stage that others follow, and the last one
 _ENOUGH = (1.0, 0.3)
 _THROUGHOUT = 0.9  # share from which on a patch counts as clipped throughout

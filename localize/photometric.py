@@ -22,7 +22,7 @@ from localize.view import Unlit
 from scene.scene import Scene
 
 #: bins across a patch, at most; iterations, of which tied to the RCM
-_LEVELS = ((48, 5, 2), (240, 8, 0))
+_LEVELS = ((48, 5, 2), (240, 16, 0))
 
 
 def photometric(
