@@ -10,11 +10,12 @@ import pandas as pd
 import pytest
 
 CAMPAIGN = [sys.executable, "-m", "campaigns.command"]
+# many samples: a pose must take long enough to be interrupted
 TEXT = """\
 scene: {preset: paper-code, camera: {resolution: 300}}
 trajectory: random
 poses: 10
-samples: 4
+samples: 2048
 localizers: [paper]
 sweep:
   scene.power.value: [0.25 W, 1 W]
