@@ -15,11 +15,19 @@ TEXT = """\
 scene: {preset: paper-code, camera: {resolution: 300}}
 trajectory: random
 poses: 10
-samples: 2048
+samples: 512
 localizers: [paper]
 sweep:
   scene.power.value: [0.25 W, 1 W]
 """
+
+
+@pytest.fixture(scope="module", autouse=True)
+def interruptible():
+    """Processes begun here hear of Ctrl-C, even where the tests run in the background of a shell, which ignores it."""
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)
+    yield
+    signal.signal(signal.SIGINT, before)
 
 
 @pytest.fixture(scope="module")
