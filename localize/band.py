@@ -8,12 +8,12 @@ What remains is the position of the beam's own profile.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field
-from functools import cached_property
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
+from localize.edge_fit import EdgeFit
 from localize.forward import ambient_irradiance, look
 from localize.noise import NoiseModel
 from localize.prior import Estimate, Knowns, prior_rows
@@ -27,8 +27,6 @@ Array = NDArray[np.float64]
 _LEVEL, _SLOPE_PER_MM = 0.3, 3.0
 _SMALLEST = 1e-3  # spread of levels, and of slopes over the width of the band
 _LONGEST_STEP_BINS = 3.0
-#: a last step longer than this, in sigmas of the fit, means that the fit does not settle
-SETTLED_SIGMAS = 1.0
 
 
 @dataclass
@@ -116,17 +114,10 @@ class _Channel:
 
 
 @dataclass(frozen=True)
-class BandFit:
+class BandFit(EdgeFit):
     """A fitted band."""
 
-    estimate: Estimate
-    information: (
-        Array  #: of the pose and the free quantities `[P, P]`, priors included, if all bins erred by themselves
-    )
-    prior: Array  #: the priors' whitened rows `[Q, P]`
-    step: Array  #: the last `[P]`
     channels: tuple[_Channel, ...]
-    covered: float  #: share of the outlines that the band shows
 
     @property
     def gains(self) -> tuple[float, ...]:
@@ -138,19 +129,8 @@ class BandFit:
         """Rms of the residuals, outliers cut, over what the model expects."""
         return float(np.sqrt(np.mean(np.square([channel.misfit for channel in self.channels]))))
 
-    @property
-    def settled(self) -> bool:
-        """Whether the last step was short."""
-        return float(self.step @ np.linalg.solve(self.covariance, self.step)) < SETTLED_SIGMAS**2
-
-    @property
-    def correlation(self) -> float:
-        """How much larger the covariance is than if all bins erred by themselves."""
-        return float(np.trace(self.covariance @ self.information)) / len(self.information)
-
-    @cached_property
-    def covariance(self) -> Array:
-        """Covariance of the pose and the free quantities `[P, P]` as the strips' residuals show it (a sandwich)."""
+    def scatter(self) -> Array:
+        """Covariance of the gradient `[P, P]` as the strips' residuals show it."""
         size, strips = len(self.information), self.channels[0].strips
         scores, parts = np.zeros((strips.count, size)), np.zeros((strips.count, size, size))
         known = self.prior.T @ self.prior
@@ -162,10 +142,7 @@ class BandFit:
             known = known + (reduced[:, size:] * channel.precision) @ reduced[:, size:].T
             scores = scores + gradient @ reduced.T / channel.follows
             parts = parts + reduced @ own @ reduced.T
-        meat = score_covariance(strips, scores, parts) + known
-        scale = np.sqrt(np.maximum(np.diag(self.information), 1e-300))
-        bread = np.linalg.inv(self.information / np.outer(scale, scale)) / np.outer(scale, scale)
-        return np.asarray(bread @ meat @ bread)
+        return score_covariance(strips, scores, parts) + known
 
 
 def fit_band(
@@ -194,7 +171,7 @@ def fit_band(
     roll = len(nominal.spotlights) > 1
     pose_size = 6 if roll else 5
     size = pose_size + len(knowns.free)
-    used = Knowns(0.0, *list(vars(knowns).values())[1:]) if tied else knowns
+    used = replace(knowns, rcm_sigma_mm=0.0) if tied else knowns
     band = Ribbon.along(image, estimate, side=side, inner=inner, outer=outer, unlit=unlit)
     if band is None:
         return None
@@ -242,7 +219,7 @@ def fit_band(
         length = float(step @ information @ step)
         if length < enough**2 and turn >= 2:
             break
-    return BandFit(estimate, information, pj, step, tuple(channels), band.covered)
+    return BandFit(estimate, information, pj, step, band.covered, tuple(channels))
 
 
 def _first_gain(shown: Channel, irradiance: Array, light_: Array, offset: Array) -> float:

@@ -15,10 +15,12 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from localize.edge import EdgeFit, fit_edge
+from localize.edge import fit_edge
+from localize.edge_fit import EdgeFit
 from localize.forward import tangents
 from localize.noise import NoiseModel, noise_of
 from localize.prior import FREE, Knowns, value, with_value
+from localize.solve import inverse
 from localize.start import find_start
 from scene.beam import CyclesBeam
 from scene.document import InputError
@@ -161,8 +163,7 @@ def _combined(terms: list[tuple[Array, Array]], prior: Array, off: Array, inflat
     """The step that all frames and the prior, `off` away, agree on, and its covariance."""
     system = np.diag(prior) + np.sum([i for i, _ in terms], axis=0) / inflation
     right = prior * off + np.sum([g for _, g in terms], axis=0) / inflation
-    scale = np.sqrt(np.diag(system))
-    covariance = np.linalg.inv(system / np.outer(scale, scale)) / np.outer(scale, scale)
+    covariance = inverse(system)
     return covariance @ right, covariance
 
 

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from localize.edge import fit_edge
+from localize.image import Reference
 from localize.noise import NoiseModel, noise_of
 from localize.outcome import LocalizationFailure, Outcome
 from localize.prior import Knowns
@@ -24,14 +25,13 @@ def cone(
     scene: Scene,
     *,
     knowns: Knowns | None = None,
-    reference: NDArray[np.generic] | None = None,
+    reference: Reference | None = None,
     noise: NoiseModel | None = None,
 ) -> Outcome:
     """The tip from a checked image `[H, W]` or `[H, W, 3]`; `reference` (no spotlight) helps the search only."""
     known, sensor = knowns or Knowns(), noise or noise_of(scene)
-    return believed(
-        find_starts(image, scene, reference), scene, lambda start: edge_outcome(image, scene, start, known, sensor)
-    )
+    starts = find_starts(image, scene, reference.pixels if reference else None)
+    return believed(starts, scene, lambda start: edge_outcome(image, scene, start, known, sensor))
 
 
 def edge_outcome(
@@ -47,6 +47,6 @@ def edge_outcome(
     if isinstance(fit, str):
         return LocalizationFailure(fit)
     return judged(
-        fit.estimate, np.asarray(np.linalg.inv(fit.covariance)), 1.0, scene, knowns,
+        fit.estimate, fit.covariance, scene, knowns,
         misfit=fit.misfit, covered=fit.covered, settled=fit.settled,
     )  # fmt: skip

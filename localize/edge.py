@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from localize.band import BandFit, fit_band
+from localize.edge_fit import EdgeFit
 from localize.noise import NoiseModel, linear_light
 from localize.prior import Estimate, Knowns
 from localize.profile import Profile
@@ -22,10 +23,8 @@ _SOFT = ((30, 6.0, 2.0, 6), (40, 14.0, 3.0, 16))
 _FULL = (1, 5.0, 3.0, 16)
 #: a step this short [sigmas] ends a stage that others follow, and the last one
 _ENOUGH = (1.0, 0.3)
-_THROUGHOUT = 0.9  # share from which on a patch counts as clipped throughout
+_CLIPPED, _THROUGHOUT = 0.3, 0.9  # shares from which on a patch counts as clipped, and as clipped throughout
 _SATURATED = (30, 90)  # bins across a patch that is clipped throughout, before full resolution
-
-EdgeFit = BandFit | SaturatedFit
 
 
 def is_sharp(scene: Scene) -> bool:
@@ -33,16 +32,20 @@ def is_sharp(scene: Scene) -> bool:
     return Profile.of(scene.beam).angle_at(0.5) > 0.97 * scene.beam.half_angle
 
 
-def is_clipped(image: NDArray[np.generic], scene: Scene, start: Start, *, share: float = 0.3) -> bool:
-    """Whether more than a `share` of the middle of the patch is clipped, so that only its rim can be measured."""
+def is_clipped(image: NDArray[np.generic], scene: Scene, start: Start) -> bool:
+    """Whether so much of the middle of the patch is clipped that only its rim can be measured."""
+    return _clipped_share(image, scene, start) > _CLIPPED
+
+
+def _clipped_share(image: NDArray[np.generic], scene: Scene, start: Start) -> float:
     points = outlines(Estimate(start.pose, scene))
     if not len(points):
-        return False
+        return 0.0
     column, row = np.round(points.mean(axis=0)).astype(int)
     reach = max(2, int(0.2 * np.min(np.ptp(points, axis=0))))
     cut = image[max(0, row - reach) : row + reach, max(0, column - reach) : column + reach]
     stride = max(1, reach // 16)
-    return bool(cut.size and np.mean(linear_light(cut[::stride, ::stride], scene)[1]) > share)
+    return float(np.mean(linear_light(cut[::stride, ::stride], scene)[1])) if cut.size else 0.0
 
 
 def fit_edge(
@@ -59,9 +62,9 @@ def fit_edge(
         return COVERED
     spotlights = len(scene.spotlights)
     size = float(np.max(np.ptp(points, axis=0))) / (1.0 if spotlights == 1 else 2.0)
-    sharp, clipped = is_sharp(scene), is_clipped(image, scene, start)
+    sharp, clipped = is_sharp(scene), _clipped_share(image, scene, start)
     estimate = Estimate(start.pose, scene)
-    if sharp and is_clipped(image, scene, start, share=_THROUGHOUT):
+    if sharp and clipped > _THROUGHOUT:
         saturated: SaturatedFit | None = None
         for number, side in enumerate([side for side in (int(size / bins) for bins in _SATURATED) if side > 1] + [1]):
             saturated = fit_saturated(image, estimate, knowns, side=side, tied=number == 0)
@@ -70,7 +73,7 @@ def fit_edge(
             estimate = saturated.estimate
         assert saturated is not None
         return saturated
-    full = sharp or clipped
+    full = sharp or clipped > _CLIPPED
     stages = [
         (max(1, int(size / bins)), inner, outer, turns) for bins, inner, outer, turns in (_RIM if full else _SOFT)
     ]

@@ -11,10 +11,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from localize.albedo import FUNDUS, KNOWN, Modes
-from localize.band import SETTLED_SIGMAS
+from localize.edge_fit import SETTLED_SIGMAS
 from localize.noise import NoiseModel
 from localize.piece import Piece
 from localize.prior import Estimate, Knowns, prior_rows
+from localize.solve import inverse
 from localize.view import Channel, Grid, Unlit, Window, shown_in, visible
 
 Array = NDArray[np.float64]
@@ -101,11 +102,7 @@ def fit_field(
             part, slope = piece.linearize(*light, gain)
             information += part
             gradient += slope
-        scale = np.sqrt(np.maximum(np.diag(information), 1e-12))
-        try:
-            covariance = np.linalg.inv(information / np.outer(scale, scale)) / np.outer(scale, scale)
-        except np.linalg.LinAlgError:
-            return None
+        covariance = inverse(information)
         step = covariance @ gradient
         if not np.all(np.isfinite(step)):
             return None

@@ -29,20 +29,7 @@ LOCALIZERS: dict[str, Localizer] = {
     "photometric": lambda image, scene, oracle: photometric(image, scene),
 }
 #: localizers that use what is known beside the image: the sigmas, a view without spotlights, the sensor's noise
-Estimator = Callable[[AnyImage, Scene, Knowns | None, Reference | None, NoiseModel | None], Outcome]
-ESTIMATORS: dict[str, Estimator] = {
-    "cone": lambda image, scene, knowns, reference, noise: cone(
-        image, scene, knowns=knowns, reference=reference.pixels if reference else None, noise=noise
-    ),
-    "photometric": lambda image, scene, knowns, reference, noise: photometric(
-        image,
-        scene,
-        knowns=knowns,
-        reference=reference.pixels if reference else None,
-        frames=reference.frames if reference else 1.0,
-        noise=noise,
-    ),
-}
+ESTIMATORS: dict[str, Callable[..., Outcome]] = {"cone": cone, "photometric": photometric}
 
 
 def locate(
@@ -80,7 +67,7 @@ def locate(
         raise InputError(f"localizer '{localizer}' must not see the true pose; leave oracle= out")
     if localizer in ESTIMATORS:
         unlit = None if reference is None else Reference.of(reference, scene)
-        return ESTIMATORS[localizer](checked(image, scene), scene, knowns, unlit, noise)
+        return ESTIMATORS[localizer](checked(image, scene), scene, knowns=knowns, reference=unlit, noise=noise)
     for name, given in {"knowns": knowns, "reference": reference, "noise": noise}.items():
         if given is not None:
             raise InputError(

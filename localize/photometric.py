@@ -13,9 +13,11 @@ from numpy.typing import NDArray
 from localize.cone import edge_outcome
 from localize.edge import is_clipped, is_sharp
 from localize.field import FieldFit, fit_field
+from localize.image import Reference
 from localize.noise import NoiseModel, noise_of
 from localize.outcome import LocalizationFailure, Outcome
 from localize.prior import Estimate, Knowns
+from localize.solve import inverse
 from localize.start import Start, believed, find_starts
 from localize.verdict import COVERED, UNCERTAIN, judged
 from localize.view import Unlit
@@ -30,16 +32,12 @@ def photometric(
     scene: Scene,
     *,
     knowns: Knowns | None = None,
-    reference: NDArray[np.generic] | None = None,
-    frames: float = 1.0,
+    reference: Reference | None = None,
     noise: NoiseModel | None = None,
 ) -> Outcome:
-    """The tip from a checked image `[H, W]` or `[H, W, 3]`.
-
-    `reference` is the same view in ambient light alone, averaged over `frames` frames; in the image's own pixel values.
-    """
+    """The tip from a checked image `[H, W]` or `[H, W, 3]`; `reference` is the same view in ambient light alone."""
     known, sensor = knowns or Knowns(), noise or noise_of(scene)
-    unlit = None if reference is None else Unlit(reference, frames, sensor)
+    unlit = None if reference is None else Unlit(reference.pixels, reference.frames, sensor)
 
     def localized(start: Start) -> Outcome:
         if is_sharp(scene) or is_clipped(image, scene, start):
@@ -48,11 +46,12 @@ def photometric(
         if isinstance(fit, str):
             return LocalizationFailure(fit)
         return judged(
-            fit.estimate, fit.information, 1.0, scene, known,
+            fit.estimate, inverse(fit.information), scene, known,
             misfit=fit.misfit, covered=fit.lit_share, settled=fit.settled,
         )  # fmt: skip
 
-    return believed(find_starts(image, scene, reference), scene, localized)
+    starts = find_starts(image, scene, reference.pixels if reference else None)
+    return believed(starts, scene, localized)
 
 
 def fit_patch(

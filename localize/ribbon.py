@@ -9,12 +9,13 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from localize.forward import look
 from localize.occlusion import covered
 from localize.outline import distances
 from localize.prior import Estimate
-from localize.start import nearest_outline
 from localize.strips import WIDTH, Strips
 from localize.view import Channel, Unlit, Window, shown_in
+from scene.spotlights import spotlight_axes
 
 Array = NDArray[np.float64]
 _FEWEST = 40  # bins
@@ -70,7 +71,7 @@ class Ribbon:
             cv2.polylines(mask, [np.round(points - low).astype(np.int32)], True, 1, 2 * reach + 1)
         row, column = np.nonzero(mask)
         pixels = (np.stack([column + low[0], row + low[1]], axis=1) + 0.5) * side
-        spots, alone = nearest_outline(pixels, estimate)
+        spots, alone = _nearest_outline(pixels, estimate)
         distance = distances(pixels, spots, estimate, roll=len(scene.spotlights) > 1)[0] / side
         keep = np.isfinite(distance) & alone & (distance > -inner) & (distance < outer)
         keep &= ~covered(pixels, estimate.pose, scene, side=side)
@@ -103,3 +104,15 @@ def _strip_of(
         angle = np.arctan2(pixels[mine, 1] - middle[1], pixels[mine, 0] - middle[0]) + math.pi
         result[mine] = k * per_spot + np.minimum((angle * per_spot / (2.0 * math.pi)).astype(np.intp), per_spot - 1)
     return result
+
+
+def _nearest_outline(pixels: Array, estimate: Estimate) -> tuple[NDArray[np.intp], NDArray[np.bool_]]:
+    """Which cone's outline each pixel `[N, 2]` [px] lies nearest to, and whether no other cone covers it."""
+    to = look(estimate.scene, pixels).points - estimate.pose.apex
+    to /= np.linalg.norm(to, axis=1, keepdims=True)
+    axes = spotlight_axes(estimate.pose, estimate.scene.spotlights)
+    off = np.arccos(np.clip(to @ axes.T, -1.0, 1.0)) - estimate.scene.beam.half_angle
+    nearest = np.argmin(np.abs(off), axis=1)
+    others = off.copy()
+    others[np.arange(len(off)), nearest] = math.inf
+    return nearest, others.min(axis=1) > 0.0

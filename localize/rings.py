@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 from scipy import fft
 
 from localize.noise import linear_light
+from localize.solve import spread
 from scene.scene import Scene
 
 Array = NDArray[np.float64]
@@ -46,7 +47,7 @@ class Overview:
         step = max(1, image.shape[0] // _OVERVIEW_PX)
         cut = (slice(step // 2, None, step),) * 2
         light = _one_channel(image[cut], scene)
-        noise = 1.4826 * float(np.median(np.abs(np.diff(light[::3, ::2], axis=1)))) / math.sqrt(2.0)
+        noise = spread(np.diff(light[::3, ::2], axis=1)) / math.sqrt(2.0)
         floor = max(0.5 * float(np.median(light[::3, ::3])), 4.0 * noise, 1e-5)
         return cls(light, None if reference is None else _one_channel(reference[cut], scene), step, floor)
 

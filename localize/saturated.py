@@ -7,12 +7,12 @@ pixels reach almost half a pixel beyond the outline. In strips across the edge t
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
-from functools import cached_property
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
+from localize.edge_fit import EdgeFit
 from localize.outline import distances, outline_problem
 from localize.prior import Estimate, Knowns
 from localize.ribbon import Ribbon
@@ -28,44 +28,30 @@ _SMALLEST = 0.02  # scatter of a strip [bins]
 
 
 @dataclass(frozen=True)
-class SaturatedFit:
+class SaturatedFit(EdgeFit):
     """Fitted outlines."""
 
-    estimate: Estimate
-    information: Array  #: of the pose and the free quantities `[P, P]`, priors included, if strips erred by themselves
-    prior: Array  #: the priors' whitened rows `[Q, P]`
-    step: Array  #: the last `[P]`
     strips: Strips
     rows: Array  #: displacement of each strip by the parameters and the log contrast, whitened `[S, P + 1]`
     residual: Array  #: displacements, whitened `[S]`
     contrast_spread: float  #: prior sigma of the log contrast
-    covered: float  #: share of the outlines in the frame
-    misfit: float = 1.0  #: the scatter of the strips is their own measure
 
     @property
-    def settled(self) -> bool:
-        """Whether the last step was short."""
-        return float(self.step @ np.linalg.solve(self.covariance, self.step)) < 1.0
+    def misfit(self) -> float:
+        """The scatter of the strips is their own measure."""
+        return 1.0
 
-    @property
-    def correlation(self) -> float:
-        """How much larger the covariance is than if all strips erred by themselves."""
-        return float(np.trace(self.covariance @ self.information)) / len(self.information)
-
-    @cached_property
-    def covariance(self) -> Array:
-        """Covariance of the pose and the free quantities `[P, P]` as the strips' residuals show it."""
+    def scatter(self) -> Array:
+        """Covariance of the gradient `[P, P]` as the strips' residuals show it."""
         size = len(self.information)
         weights = student_weights(self.residual)
         parts = np.einsum("s,sp,sq->spq", weights, self.rows, self.rows)
         reduced = reduction(parts.sum(axis=0) + _contrast_prior(size, self.contrast_spread), size)
         follows = max(0.3, float(np.sum(weights * student_bend(self.residual)) / np.sum(weights)))
         scores = (weights * self.residual)[:, None] * self.rows @ reduced.T / follows
-        meat = score_covariance(self.strips, scores, reduced @ parts @ reduced.T)
-        meat = meat + self.prior.T @ self.prior + reduced @ _contrast_prior(size, self.contrast_spread) @ reduced.T
-        scale = np.sqrt(np.diag(self.information))
-        bread = np.linalg.inv(self.information / np.outer(scale, scale)) / np.outer(scale, scale)
-        return np.asarray(bread @ meat @ bread)
+        seen = score_covariance(self.strips, scores, reduced @ parts @ reduced.T)
+        known = self.prior.T @ self.prior + reduced @ _contrast_prior(size, self.contrast_spread) @ reduced.T
+        return np.asarray(seen + known)
 
 
 def fit_saturated(
@@ -80,7 +66,7 @@ def fit_saturated(
     roll = len(nominal.spotlights) > 1
     pose_size = 6 if roll else 5
     size = pose_size + len(knowns.free)
-    used = Knowns(0.0, *list(vars(knowns).values())[1:]) if tied else knowns
+    used = replace(knowns, rcm_sigma_mm=0.0) if tied else knowns
     ribbon = Ribbon.along(image, estimate, side=side, inner=_BAND, outer=_BAND)
     if ribbon is None:
         return None
@@ -117,7 +103,7 @@ def fit_saturated(
         step = found / max(1.0, float(np.max(np.abs(found[:3]))) / 0.5, float(np.max(np.abs(found[3:5]))) / 0.05)
         contrast += float(np.clip((slope[size] - whole[size, :size] @ step) / whole[size, size], -1.0, 1.0))
         estimate = estimate.moved(step, pose_size, knowns.free)
-    return SaturatedFit(estimate, information, pj, step, strips, rows, residual, uncertain, ribbon.covered)
+    return SaturatedFit(estimate, information, pj, step, ribbon.covered, strips, rows, residual, uncertain)
 
 
 def _contrast_prior(size: int, sigma: float) -> Array:

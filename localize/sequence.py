@@ -118,12 +118,5 @@ def locate_sequence(
     learnt = sum(ambient.add(image) for image in frames())
     view = ambient.reference()
     sensor = noise or noise_of(scene)
-    outcomes: list[Outcome] = []
-    for image in frames():
-        if view is None:
-            outcomes.append(photometric(image, scene, knowns=knowns, noise=sensor))
-            continue
-        outcomes.append(
-            photometric(image, scene, knowns=knowns, reference=view.pixels, frames=view.frames, noise=sensor)
-        )
+    outcomes = [photometric(image, scene, knowns=knowns, reference=view, noise=sensor) for image in frames()]
     return SequenceResult(tuple(outcomes), learnt)

@@ -59,6 +59,15 @@ def solved(information: Array, gradient: Array) -> Array | None:
     return step if np.all(np.isfinite(step)) else None
 
 
+def inverse(information: Array) -> Array:
+    """The inverse of an information matrix, well scaled; infinite where it has none."""
+    scale = np.sqrt(np.maximum(np.diag(information), 1e-300))
+    try:
+        return np.asarray(np.linalg.inv(information / np.outer(scale, scale)) / np.outer(scale, scale))
+    except np.linalg.LinAlgError:
+        return np.full_like(information, np.inf)
+
+
 @dataclass(frozen=True)
 class Solution:
     """A minimum: the estimate, the information matrix there and the whitened residuals of the data."""

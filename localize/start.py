@@ -15,16 +15,16 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from localize.forward import look, moved, tangents
+from localize.forward import moved, tangents
 from localize.outcome import Localization, LocalizationFailure, Outcome
 from localize.outline import distances
 from localize.prior import Estimate
 from localize.rays import rays_across, support
 from localize.rig import poses_on
 from localize.rings import Overview, Ring, find_rings
+from localize.solve import spread
 from scene.pose import Pose
 from scene.scene import Scene
-from scene.spotlights import spotlight_axes
 
 Array = NDArray[np.float64]
 NOTHING = "no spotlight stands out from its surroundings"
@@ -229,7 +229,7 @@ def _towards(estimate: Estimate, pixels: Array, spots: NDArray[np.intp], worth: 
     tied = jacobian[:, :3] + (np.outer(jacobian[:, 3], u) + np.outer(jacobian[:, 4], v)) / length
     if roll:
         tied = np.column_stack([tied, jacobian[:, 5]])
-    scale = np.maximum(0.01 * sizes, 1.4826 * float(np.median(np.abs(r))))
+    scale = np.maximum(0.01 * sizes, spread(r))
     weighted = tied * (worth / (4.0 + np.square(r / scale)) / scale**2)[:, None]
     try:
         step = -np.linalg.solve(weighted.T @ tied, weighted.T @ r)
@@ -245,15 +245,3 @@ def _towards(estimate: Estimate, pixels: Array, spots: NDArray[np.intp], worth: 
         return Estimate(through, scene)
     turned = moved(pose, np.array([*step[:3], u @ step[:3] / length, v @ step[:3] / length, step[3]]))
     return Estimate(Pose(tip, through.axis, turned.roll), scene)
-
-
-def nearest_outline(pixels: Array, estimate: Estimate) -> tuple[NDArray[np.intp], NDArray[np.bool_]]:
-    """Which cone's outline each pixel `[N, 2]` [px] lies nearest to, and whether no other cone covers it."""
-    to = look(estimate.scene, pixels).points - estimate.pose.apex
-    to /= np.linalg.norm(to, axis=1, keepdims=True)
-    axes = spotlight_axes(estimate.pose, estimate.scene.spotlights)
-    off = np.arccos(np.clip(to @ axes.T, -1.0, 1.0)) - estimate.scene.beam.half_angle
-    nearest = np.argmin(np.abs(off), axis=1)
-    others = off.copy()
-    others[np.arange(len(off)), nearest] = math.inf
-    return nearest, others.min(axis=1) > 0.0

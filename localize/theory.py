@@ -18,6 +18,7 @@ from localize.forward import Light, light, look, window
 from localize.outline import distances
 from localize.prior import BEAM, Estimate, Knowns, prior_rows, value, with_value
 from localize.profile import Profile
+from localize.solve import inverse
 from scene.pose import Pose
 from scene.scene import Scene
 from scene.surface import Surface
@@ -97,13 +98,9 @@ def cramer_rao(
     count = size + len(knowns.free)
     _, prior = prior_rows(Estimate(pose, scene), scene, knowns, size)
     information[:count, :count] += prior.T @ prior
-    scale = np.sqrt(np.diag(information))
-    if np.any(scale == 0.0):
+    covariance = inverse(information)
+    if np.any(np.diag(information) == 0.0) or not np.all(np.isfinite(covariance)):
         raise ValueError("the frame does not determine every free quantity")
-    try:
-        covariance = np.linalg.inv(information / np.outer(scale, scale)) / np.outer(scale, scale)
-    except np.linalg.LinAlgError:
-        raise ValueError("the frame does not determine every free quantity") from None
     return Bound(covariance[:size, :size])
 
 

@@ -31,8 +31,7 @@ _FLOOR_MM, _FLOOR_RAD = 2e-5, 2e-6
 
 def judged(
     estimate: Estimate,
-    information: Array,
-    inflation: float,
+    covariance: Array,
     nominal: Scene,
     knowns: Knowns,
     *,
@@ -42,8 +41,8 @@ def judged(
 ) -> Outcome:
     """The localization, or why there is none.
 
-    `information` `[P, P]` is of the pose and the free quantities with priors; `inflation` is by how much correlated
-    residuals make its data worth less. `misfit` is the rms residual over the model's, `covered` the share seen.
+    `covariance` `[P, P]` is of the pose and the free quantities, infinite if there is none. `misfit` is the rms
+    residual over the model's, `covered` the share seen.
     """
     if covered < _LEAST_COVERED:
         return LocalizationFailure(COVERED)
@@ -53,10 +52,7 @@ def judged(
     if float(inwards @ estimate.pose.axis) <= 0.0:
         return LocalizationFailure(BEHIND)
     size = 6 if len(nominal.spotlights) > 1 else 5
-    covariance = _inverse(information)
-    if covariance is None:
-        return LocalizationFailure(UNCERTAIN)
-    pose = covariance[:size, :size] * inflation
+    pose = covariance[:size, :size].copy()
     pose[np.arange(3), np.arange(3)] += _FLOOR_MM**2
     pose[np.arange(3, size), np.arange(3, size)] += _FLOOR_RAD**2
     sigma = math.sqrt(float(np.trace(pose[:3, :3])))
@@ -78,11 +74,3 @@ def judged(
         pose[:5, 5] *= -1.0
         return Localization(estimate.pose.apex, estimate.pose.axis, pose, roll=estimate.pose.roll)
     return Localization(estimate.pose.apex, estimate.pose.axis, pose)
-
-
-def _inverse(information: Array) -> Array | None:
-    scale = np.sqrt(np.maximum(np.diag(information), 1e-300))
-    try:
-        return np.asarray(np.linalg.inv(information / np.outer(scale, scale)) / np.outer(scale, scale))
-    except np.linalg.LinAlgError:
-        return None

@@ -11,11 +11,11 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import BeforeValidator, Field, ValidationInfo, model_validator
 
+from scene.csv_lines import csv_lines
 from scene.model import Model
 from scene.quantity import Length
 
 Array = NDArray[np.float64]
-_MAX_BYTES = 20_000_000
 _FEWEST, _MOST = 4, 512  #: nodes a side
 _HIGHEST = 100.0  #: [mm], above any eye: what a spline can still be put through
 
@@ -116,16 +116,8 @@ def _cubic(f: Array) -> tuple[Array, Array]:
 
 def _read_matrix(path: Path) -> list[list[float]]:
     """The numbers in a CSV file, row by row; `#` lines are left out. Raises ValueError with file and line."""
-    try:
-        if path.stat().st_size > _MAX_BYTES:
-            raise ValueError(f"{path}: larger than 20 MB, not a height map")
-        lines = path.read_text("utf-8-sig").splitlines()
-    except (OSError, UnicodeDecodeError) as error:
-        raise ValueError(f"{path}: cannot be read as CSV ({error})") from None
     matrix: list[list[float]] = []
-    for number, line in enumerate(lines, 1):
-        if not line.strip() or line.startswith("#"):
-            continue
+    for number, line in csv_lines(path, "height map"):
         if len(matrix) == _MOST or line.count(",") >= _MOST:
             raise ValueError(f"{path}:{number}: a height map has at most {_MOST} rows and columns")
         try:

@@ -11,8 +11,9 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from scene.csv_lines import csv_lines
+
 Array = NDArray[np.float64]
-_MAX_BYTES = 20_000_000
 
 
 @dataclass(frozen=True, eq=False)
@@ -108,18 +109,10 @@ def read_curve(path: Path) -> list[tuple[float, float]]:
 
     Raises ValueError with file and line for anything else.
     """
-    try:
-        if path.stat().st_size > _MAX_BYTES:
-            raise ValueError(f"{path}: larger than 20 MB, not a spectrum")
-        lines = path.read_text("utf-8-sig").splitlines()
-    except (OSError, UnicodeDecodeError) as error:
-        raise ValueError(f"{path}: cannot be read as CSV ({error})") from None
     pairs: list[tuple[float, float]] = []
     header_seen = False
-    for number, line in enumerate(lines, 1):
+    for number, line in csv_lines(path, "spectrum"):
         cells = line.split(",")
-        if not line.strip() or line.startswith("#"):
-            continue
         try:
             wavelength, value = float(cells[0]), float(cells[1])
         except (ValueError, IndexError):

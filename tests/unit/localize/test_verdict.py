@@ -7,6 +7,7 @@ import pytest
 
 from localize.outcome import Localization
 from localize.prior import Estimate, Knowns
+from localize.solve import inverse
 from localize.verdict import (
     BEHIND,
     COVERED,
@@ -30,7 +31,7 @@ FINE = {"misfit": 1.0, "covered": 1.0, "settled": True}
 
 def verdict(pose=None, sigmas=SIGMAS, inflation=1.0, knowns=Knowns(0.01), scene=Scene(), **more):  # noqa: B008
     estimate = Estimate(scene.pose(TIP) if pose is None else pose, scene)
-    return judged(estimate, np.diag(1.0 / np.square(sigmas)), inflation, scene, knowns, **{**FINE, **more})
+    return judged(estimate, inflation * np.diag(np.square(sigmas)), scene, knowns, **{**FINE, **more})
 
 
 def test_a_fit_that_agrees_with_its_model_comes_with_its_covariance():
@@ -53,7 +54,7 @@ def test_quantities_beside_the_pose_are_in_the_covariance_and_left_out_of_it():
     information = np.diag(1.0 / np.square([*SIGMAS, 1e-3]))
     information[2, 5] = information[5, 2] = 0.6 * math.sqrt(information[2, 2] * information[5, 5])
     scene, knowns = Scene(), Knowns(0.01, half_angle_sigma_deg=0.05)
-    found = judged(Estimate(scene.pose(TIP), scene), information, 1.0, scene, knowns, **FINE)
+    found = judged(Estimate(scene.pose(TIP), scene), inverse(information), scene, knowns, **FINE)
     assert found.covariance.shape == (5, 5)
     assert math.sqrt(found.covariance[2, 2]) == pytest.approx(SIGMAS[2] / 0.8, rel=1e-3)
 
