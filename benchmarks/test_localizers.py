@@ -10,14 +10,14 @@ import cv2
 import numpy as np
 import pytest
 
-from localize import SensorNoise, locate
-from localize.forward import look
-from localize.theory import patch_pixels
-from scene.beam import CyclesBeam, HardBeam
-from scene.camera import Camera
-from scene.scene import Scene
-from scene.sensor import Linear
-from scene.spotlights import spotlight_axes
+from conespot.localize import SensorNoise, locate
+from conespot.localize.model.forward import look
+from conespot.localize.theory.bounds import patch_pixels
+from conespot.scene.beam import CyclesBeam, HardBeam
+from conespot.scene.camera import Camera
+from conespot.scene.scene import Scene
+from conespot.scene.sensor import Linear
+from conespot.scene.spotlights import spotlight_axes
 
 PEAK, AMBIENT, READ = 9000.0, 200.0, 15.0
 WHITE = 1.25 * PEAK

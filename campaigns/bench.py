@@ -11,23 +11,23 @@ from typing import TYPE_CHECKING
 import cv2
 import numpy as np
 
-from campaigns.knowledge import Knowledge
-from campaigns.plan import Case, Group, Plan, Unit, frame_seed, reference_seed, tile_seed, told
-from campaigns.row import Finding, Record
-from campaigns.store import made_with
-from localize import ESTIMATORS, Knowns, LocalizationFailure, locate
-from localize.assessment import electrons_of
-from localize.image import AnyImage, Reference
-from localize.outcome import Outcome
-from localize.sequence import AmbientMap
-from localize.theory import cramer_rao
-from scene import Pose
+from conespot.campaigns.knowledge import Knowledge
+from conespot.campaigns.plan import Case, Group, Plan, Unit, frame_seed, reference_seed, tile_seed, told
+from conespot.campaigns.row import Finding, Record
+from conespot.campaigns.store import made_with
+from conespot.localize import ESTIMATORS, Knowns, LocalizationFailure, locate
+from conespot.localize.image import AnyImage, Reference
+from conespot.localize.outcome import Outcome
+from conespot.localize.sequence import AmbientMap
+from conespot.localize.theory.assessment import electrons_of
+from conespot.localize.theory.bounds import cramer_rao
+from conespot.scene import Pose
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from render import Exposure, Renderer, Tile
-    from scene.sensor import Sensor
+    from conespot.render import Exposure, Renderer, Tile
+    from conespot.scene.sensor import Sensor
 
 #: loading scenes leaks memory in Mitsuba, so a worker that has loaded this many is replaced
 MAX_SCENES = 64
@@ -37,7 +37,7 @@ class Bench:
     """Measures units of a plan on one thread; holds one scene at a time. Frames go to `frames` if that is a folder."""
 
     def __init__(self, plan: Plan, frames: Path | None) -> None:
-        from render import kernel
+        from conespot.render import kernel
 
         cv2.setNumThreads(1)
         kernel.use_threads(1)
@@ -59,7 +59,7 @@ class Bench:
         renderer, exposure = self._scene(group)
         background = renderer.background(pose)
         if group.scene.instrument.shaft is not None:
-            from render import Exposure
+            from conespot.render import Exposure
 
             exposure = Exposure(background, exposure.sensor)
         tiles = self._tiles(renderer, unit)
@@ -130,7 +130,7 @@ class Bench:
 
     def _scene(self, group: Group) -> tuple[Renderer, Exposure]:
         if self._loaded is None or self._loaded[0] != group.scene_key:
-            from render import Exposure, Renderer
+            from conespot.render import Exposure, Renderer
 
             self._loaded = None  # the old scene goes before the new one comes
             renderer = Renderer(group.scene, samples=group.samples, edge_samples=group.edge_samples)
@@ -156,7 +156,7 @@ class Bench:
     def _keep(
         self, name: str, case: Case, pose: Pose, radiance: NDArray[np.float32], image: NDArray[np.uint8 | np.uint16]
     ) -> None:
-        from render.frame_file import frame_header, write_frame, write_preview
+        from conespot.render.frame_file import frame_header, write_frame, write_preview
 
         assert self._frames is not None
         header = frame_header(case.scene, pose, case.scene.power.value, made_with(self._plan))

@@ -10,10 +10,10 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from campaigns.ending import Ending, RunError
+from conespot.campaigns.ending import Ending, RunError
 
 if TYPE_CHECKING:
-    from scene.document import Document
+    from conespot.scene.document import Document
 
 #: options that set a key of the campaign
 _SETTINGS = {
@@ -28,7 +28,7 @@ _SETTINGS = {
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run a command line; the exit code: 0 done, 1 something failed, 2 bad input, 130 interrupted."""
     options = _parser().parse_args(arguments)
-    from scene.document import InputError
+    from conespot.scene.document import InputError
 
     try:
         code: Ending = options.run(options)
@@ -123,7 +123,7 @@ def _cores() -> int:
 
 def _document(options: argparse.Namespace) -> Document:
     """The campaign's file with the settings of the command line on it."""
-    from campaigns.schema import override, read_campaign, setting
+    from conespot.campaigns.schema import override, read_campaign, setting
 
     document = read_campaign(options.campaign)
     for name, (key, _, _) in _SETTINGS.items():
@@ -138,7 +138,7 @@ def _document(options: argparse.Namespace) -> Document:
 
 
 def _validate(options: argparse.Namespace) -> Ending:
-    from campaigns.plan import make_plan
+    from conespot.campaigns.plan import make_plan
 
     plan = make_plan(_document(options))
     _say(f"{options.campaign}: valid, {len(plan.cases)} cases, {plan.rows} rows")
@@ -146,16 +146,16 @@ def _validate(options: argparse.Namespace) -> Ending:
 
 
 def _plan(options: argparse.Namespace) -> Ending:
-    from campaigns.plan import make_plan
-    from campaigns.summary import summary
+    from conespot.campaigns.plan import make_plan
+    from conespot.campaigns.plan_words import summary
 
     _say("\n".join(summary(make_plan(_document(options)), options.workers)))
     return Ending.DONE
 
 
 def _run(options: argparse.Namespace) -> Ending:
-    from campaigns.plan import make_plan
-    from campaigns.store import open_store
+    from conespot.campaigns.plan import make_plan
+    from conespot.campaigns.store import open_store
 
     if options.dry_run:
         return _plan(options)
@@ -167,11 +167,11 @@ def _run(options: argparse.Namespace) -> Ending:
     with open_store(folder, plan, document) as store:
         code = Ending.DONE
         if plan.cases:
-            from campaigns.session import measure
+            from conespot.campaigns.session import measure
 
             code = measure(plan, store, options.workers)
         if plan.campaign.theory:
-            from campaigns.session import write_theory
+            from conespot.campaigns.session import write_theory
 
             write_theory(folder)
     if code != Ending.INTERRUPTED:
@@ -180,7 +180,7 @@ def _run(options: argparse.Namespace) -> Ending:
 
 
 def _theory(options: argparse.Namespace) -> Ending:
-    from campaigns.theory import write_theory_of
+    from conespot.campaigns.theory_run import write_theory_of
 
     folder, text = write_theory_of(options.scene, options.set, options.out)
     _say(text)
@@ -189,9 +189,9 @@ def _theory(options: argparse.Namespace) -> Ending:
 
 
 def _report(options: argparse.Namespace) -> Ending:
-    from campaigns.plan import make_plan
-    from campaigns.schema import read_campaign
-    from campaigns.store import open_store
+    from conespot.campaigns.plan import make_plan
+    from conespot.campaigns.schema import read_campaign
+    from conespot.campaigns.store import open_store
 
     folder: Path = options.folder
     if (folder / "journal.jsonl").exists() and (folder / "campaign.yaml").exists():
@@ -206,7 +206,7 @@ def _report(options: argparse.Namespace) -> Ending:
 
 
 def _compare(options: argparse.Namespace) -> Ending:
-    from campaigns.compare import compare
+    from conespot.campaigns.compare import compare
 
     _say(compare(options.folders, options.lights))
     _say(f"{options.folders[0]}: comparison.txt, tables/comparison.csv, figures/comparison_*")
@@ -214,7 +214,7 @@ def _compare(options: argparse.Namespace) -> Ending:
 
 
 def _write_results(folder: Path) -> None:
-    from results import summary, write_results
+    from conespot.results import summary, write_results
 
     write_results(folder)
     _say(summary(folder))
@@ -222,7 +222,7 @@ def _write_results(folder: Path) -> None:
 
 
 def _list(options: argparse.Namespace) -> Ending:
-    from scene.document import read_document, shipped
+    from conespot.scene.document import read_document, shipped
 
     for name, path in shipped("campaigns", "").items():
         _say(f"{name:16} {read_document(path).data.get('description', '')}")
@@ -230,7 +230,7 @@ def _list(options: argparse.Namespace) -> Ending:
 
 
 def _show(options: argparse.Namespace) -> Ending:
-    from scene.document import find_document, read_document
+    from conespot.scene.document import find_document, read_document
 
     path = find_document(options.campaign, "campaigns", "", "campaign")
     read_document(path)
@@ -239,8 +239,8 @@ def _show(options: argparse.Namespace) -> Ending:
 
 
 def _doctor(options: argparse.Namespace) -> Ending:
-    from render.doctor import examine
-    from render.kernel import KernelError
+    from conespot.render.doctor import examine
+    from conespot.render.kernel import KernelError
 
     try:
         for line in examine():

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from pathlib import Path
 
-from scene import InputError
+from conespot.scene import InputError
 
 #: two runs are what can differ; more would be a table nobody reads
 MOST_RUNS = 8
@@ -18,6 +18,6 @@ def compare(folders: Sequence[Path], lights: str | None) -> str:
     names = [name.strip() for name in lights.split(",")] if lights else []
     if names and (len(names) != 2 or not all(names) or names[0] == names[1]):
         raise InputError(f"--lights {lights}: write the reference and another light, such as led-b3,ir850")
-    from results.compare_runs import compare_runs
+    from conespot.results.compare_runs import compare_runs
 
     return compare_runs(folders, *names)

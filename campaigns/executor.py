@@ -19,9 +19,9 @@ from multiprocessing.connection import Connection, wait
 from pathlib import Path
 from typing import Protocol
 
-from campaigns.ending import RunError, held_back
-from campaigns.plan import Plan, Unit
-from campaigns.row import Record
+from conespot.campaigns.ending import RunError, held_back
+from conespot.campaigns.plan import Plan, Unit
+from conespot.campaigns.row import Record
 
 _ONE_THREAD = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "VECLIB_MAXIMUM_THREADS")
 #: workers lost in a row, with nothing ever finished, after which the machine is to blame and not the units
@@ -41,7 +41,7 @@ class Measures(Protocol):
 
 def make_bench(plan: Plan, frames: Path | None) -> Measures:
     """The bench of a worker, imported where it is used: the parent process never loads Mitsuba."""
-    from campaigns.bench import Bench
+    from conespot.campaigns.bench import Bench
 
     return Bench(plan, frames)
 

@@ -11,11 +11,11 @@ from typing import TYPE_CHECKING, Annotated, Any
 import numpy as np
 from pydantic import BeforeValidator, Field, PlainSerializer, model_validator
 
-from scene import Scene
-from scene.beam import stretched
-from scene.model import Model
-from scene.quantity import Angle, Length, format_quantity
-from scene.surface import AnySurface
+from conespot.scene import Scene
+from conespot.scene.beam import stretched
+from conespot.scene.model import Model
+from conespot.scene.quantity import Angle, Length, format_quantity
+from conespot.scene.surface import AnySurface
 
 FREE = "free"
 

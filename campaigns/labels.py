@@ -6,10 +6,10 @@ import json
 from collections.abc import Callable, Sequence
 from typing import Any
 
-from campaigns.schema import Campaign, Combination
-from scene.model import identity
-from scene.spotlights import rig_name
-from scene.surface import surface_name
+from conespot.campaigns.schema import Campaign, Combination
+from conespot.scene.model import identity
+from conespot.scene.spotlights import rig_name
+from conespot.scene.surface import surface_name
 
 Label = str | float
 _LONGEST = 120

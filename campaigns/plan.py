@@ -14,12 +14,12 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import BaseModel
 
-from campaigns.knowledge import Knowledge
-from campaigns.labels import label_columns, swept_columns, without_files
-from campaigns.schema import Campaign, Combination, base, combinations, makes_frames
-from scene import InputError, Pose, Scene
-from scene.document import Document
-from scene.model import identity
+from conespot.campaigns.knowledge import Knowledge
+from conespot.campaigns.labels import label_columns, swept_columns, without_files
+from conespot.campaigns.schema import Campaign, Combination, base, combinations, makes_frames
+from conespot.scene import InputError, Pose, Scene
+from conespot.scene.document import Document
+from conespot.scene.model import identity
 
 #: frames times localizers; no more than the results read back
 MAX_ROWS = 1_000_000

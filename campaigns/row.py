@@ -11,11 +11,11 @@ from typing import TYPE_CHECKING, Annotated
 import numpy as np
 from pydantic import Field, FiniteFloat, model_validator
 
-from scene import Pose, Scene
-from scene.model import Model
+from conespot.scene import Pose, Scene
+from conespot.scene.model import Model
 
 if TYPE_CHECKING:
-    from campaigns.plan import Plan
+    from conespot.campaigns.plan import Plan
 
 Vector = tuple[FiniteFloat, FiniteFloat, FiniteFloat]
 Row = dict[str, str | float]

@@ -15,12 +15,12 @@ from typing import Annotated, Any, Literal
 
 from pydantic import BeforeValidator, Field
 
-from campaigns.knowledge import Knowledge
-from scene import InputError, Scene
-from scene.document import Document, Path_, find_document, merge, read_document, read_value
-from scene.model import Model, unknown_name
-from scene.scene import expand
-from scene.trajectory import AnyTrajectory, Box
+from conespot.campaigns.knowledge import Knowledge
+from conespot.scene import InputError, Scene
+from conespot.scene.document import Document, Path_, find_document, merge, read_document, read_value
+from conespot.scene.model import Model, unknown_name
+from conespot.scene.scene import expand
+from conespot.scene.trajectory import AnyTrajectory, Box
 
 MAX_COMBINATIONS = 10_000
 #: named in the file by a word alone, which stands for a mapping with this key
@@ -31,7 +31,7 @@ _SWEPT = (*_CASE, "seed")
 
 
 def _known_localizer(value: Any) -> Any:
-    from localize import LOCALIZERS
+    from conespot.localize import LOCALIZERS
 
     if isinstance(value, str) and value not in LOCALIZERS:
         raise unknown_name(value, list(LOCALIZERS), "localizer")

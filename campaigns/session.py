@@ -4,15 +4,38 @@ from __future__ import annotations
 
 import contextlib
 import sys
+from collections.abc import Mapping
 from pathlib import Path
 
-from campaigns.ending import Ending
-from campaigns.executor import execute
-from campaigns.plan import Plan
-from campaigns.progress import Progress
-from campaigns.store import Store, made_with
-from scene import InputError
-from scene.atomic import write_atomically
+from conespot.campaigns.ending import Ending
+from conespot.campaigns.executor import execute
+from conespot.campaigns.plan import Plan, make_plan
+from conespot.campaigns.progress import Progress
+from conespot.campaigns.schema import override, read_campaign
+from conespot.campaigns.store import Store, made_with, open_store
+from conespot.scene import InputError
+from conespot.scene.atomic import write_atomically
+
+
+def run_campaign(
+    campaign: str | Path, out: Path | None = None, *, workers: int = 1, settings: Mapping[str, str] | None = None
+) -> Path:
+    """Run a shipped campaign or a YAML file, or continue it; the run folder, with its rows but no report yet.
+
+    `out` is the run folder (default runs/NAME), `settings` are keys and YAML values such as {"poses": "10"}.
+    Raises InputError for what a user can mend, RunError if the disk refuses or nothing can run.
+    """
+    document = read_campaign(str(campaign))
+    for key, value in (settings or {}).items():
+        document = override(document, key, value, f"settings[{key!r}]")
+    plan = make_plan(document)
+    folder = out or Path("runs") / plan.campaign.name
+    with open_store(folder, plan, document) as store:
+        if plan.cases:
+            measure(plan, store, workers)
+        if plan.campaign.theory:
+            write_theory(folder)
+    return folder
 
 
 def measure(plan: Plan, store: Store, workers: int) -> Ending:
@@ -62,7 +85,7 @@ def measure(plan: Plan, store: Store, workers: int) -> Ending:
 
 def write_theory(folder: Path) -> None:
     """Table I as theory.csv: largest distance of curve and ellipse in the plane, in 3D, and in 3D over the volume."""
-    from localize.conic import table_1
+    from conespot.localize.theory.conic import table_1
 
     lines = ["half_angle_deg,in_plane_um,distance_3d_um,volume_distance_3d_um"]
     lines += [f"{r.half_angle_deg!r},{r.in_plane_um!r},{r.distance_um!r},{r.volume_distance_um!r}" for r in table_1()]

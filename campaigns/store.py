@@ -16,13 +16,13 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import IO
 
-from campaigns.ending import RunError, held_back
-from campaigns.plan import Plan
-from campaigns.row import Record, rows
-from campaigns.schema import resolved
-from scene import InputError
-from scene.atomic import write_atomically
-from scene.document import Document, dump, read_document
+from conespot.campaigns.ending import RunError, held_back
+from conespot.campaigns.plan import Plan
+from conespot.campaigns.row import Record, rows
+from conespot.campaigns.schema import resolved
+from conespot.scene import InputError
+from conespot.scene.atomic import write_atomically
+from conespot.scene.document import Document, dump, read_document
 
 _VERSIONS = ("conespot", "mitsuba", "drjit", "numpy", "scipy", "opencv-python-headless", "karellen-llvm-core")
 _LONGEST_LINE = 1_000_000

@@ -15,16 +15,16 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from localize.edge import fit_edge
-from localize.edge_fit import EdgeFit
-from localize.forward import tangents
-from localize.noise import NoiseModel, noise_of
-from localize.prior import FREE, Knowns, value, with_value
-from localize.solve import inverse
-from localize.start import find_start
-from scene.beam import CyclesBeam
-from scene.document import InputError
-from scene.scene import Scene
+from conespot.localize.edge.fit import fit_edge
+from conespot.localize.edge.sandwich import EdgeFit
+from conespot.localize.model.forward import tangents
+from conespot.localize.model.noise import NoiseModel, noise_of
+from conespot.localize.model.prior import FREE, Knowns, value, with_value
+from conespot.localize.model.solve import inverse
+from conespot.localize.start.search import find_start
+from conespot.scene.beam import CyclesBeam
+from conespot.scene.document import InputError
+from conespot.scene.scene import Scene
 
 Array = NDArray[np.float64]
 NAMES = (*FREE, "rcm_x", "rcm_y", "rcm_z")

@@ -9,15 +9,15 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from localize.edge import fit_edge
-from localize.image import Reference
-from localize.noise import NoiseModel, noise_of
-from localize.outcome import LocalizationFailure, Outcome
-from localize.prior import Knowns
-from localize.start import Start, believed, find_starts
-from localize.verdict import judged
-from localize.view import Unlit
-from scene.scene import Scene
+from conespot.localize.edge.fit import fit_edge
+from conespot.localize.image import Reference
+from conespot.localize.model.noise import NoiseModel, noise_of
+from conespot.localize.model.prior import Knowns
+from conespot.localize.model.view import Unlit
+from conespot.localize.outcome import LocalizationFailure, Outcome
+from conespot.localize.start.search import Start, believed, find_starts
+from conespot.localize.verdict import judged
+from conespot.scene.scene import Scene
 
 
 def cone(

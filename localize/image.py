@@ -10,7 +10,7 @@ import cv2
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from scene import InputError, Scene
+from conespot.scene import InputError, Scene
 
 AnyImage = NDArray[Any]  #: `[H, W]` or `[H, W, 3]` (RGB)
 

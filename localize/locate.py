@@ -7,14 +7,14 @@ from collections.abc import Callable
 
 from numpy.typing import ArrayLike
 
-from localize.cone import cone
-from localize.image import AnyImage, Reference, checked
-from localize.noise import NoiseModel
-from localize.outcome import Outcome
-from localize.photometric import photometric
-from localize.prior import Knowns
-from localize.published import paper, paper_code, paper_code_float, paper_code_oracle
-from scene import InputError, Pose, Scene
+from conespot.localize.cone import cone
+from conespot.localize.image import AnyImage, Reference, checked
+from conespot.localize.model.noise import NoiseModel
+from conespot.localize.model.prior import Knowns
+from conespot.localize.outcome import Outcome
+from conespot.localize.photometric import photometric
+from conespot.localize.published.methods import paper, paper_code, paper_code_float, paper_code_oracle
+from conespot.scene import InputError, Pose, Scene
 
 #: a checked image `[H, W]` or `[H, W, 3]`, the scene that took it and, for an oracle, the truth
 Localizer = Callable[[AnyImage, Scene, Pose | None], Outcome]

@@ -10,18 +10,18 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from localize.cone import edge_outcome
-from localize.edge import is_clipped, is_sharp
-from localize.field import FieldFit, fit_field
-from localize.image import Reference
-from localize.noise import NoiseModel, noise_of
-from localize.outcome import LocalizationFailure, Outcome
-from localize.prior import Estimate, Knowns
-from localize.solve import inverse
-from localize.start import Start, believed, find_starts
-from localize.verdict import COVERED, UNCERTAIN, judged
-from localize.view import Unlit
-from scene.scene import Scene
+from conespot.localize.cone import edge_outcome
+from conespot.localize.edge.fit import is_clipped, is_sharp
+from conespot.localize.field.fit import FieldFit, fit_field
+from conespot.localize.image import Reference
+from conespot.localize.model.noise import NoiseModel, noise_of
+from conespot.localize.model.prior import Estimate, Knowns
+from conespot.localize.model.solve import inverse
+from conespot.localize.model.view import Unlit
+from conespot.localize.outcome import LocalizationFailure, Outcome
+from conespot.localize.start.search import Start, believed, find_starts
+from conespot.localize.verdict import COVERED, UNCERTAIN, judged
+from conespot.scene.scene import Scene
 
 #: bins across a patch, at most; iterations, of which tied to the RCM
 _LEVELS = ((48, 5, 2), (240, 16, 0))

@@ -12,16 +12,16 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from localize.image import Reference, white_level
-from localize.noise import NoiseModel, noise_of
-from localize.outcome import Outcome
-from localize.photometric import photometric
-from localize.prior import Estimate, Knowns
-from localize.start import find_start
-from localize.view import outlines
-from scene.document import InputError
-from scene.emva import Emva
-from scene.scene import Scene
+from conespot.localize.image import Reference, white_level
+from conespot.localize.model.noise import NoiseModel, noise_of
+from conespot.localize.model.prior import Estimate, Knowns
+from conespot.localize.model.view import outlines
+from conespot.localize.outcome import Outcome
+from conespot.localize.photometric import photometric
+from conespot.localize.start.search import find_start
+from conespot.scene.document import InputError
+from conespot.scene.emva import Emva
+from conespot.scene.scene import Scene
 
 Array = NDArray[np.float64]
 _MARGIN = 0.25  # of a patch's size, kept out around it: a start is good to a twentieth

@@ -7,9 +7,9 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from localize.outcome import Localization, LocalizationFailure, Outcome
-from localize.prior import Estimate, Knowns, rcm_miss
-from scene.scene import Scene
+from conespot.localize.model.prior import Estimate, Knowns, rcm_miss
+from conespot.localize.outcome import Localization, LocalizationFailure, Outcome
+from conespot.scene.scene import Scene
 
 Array = NDArray[np.float64]
 UNCERTAIN = "too uncertain: the patch and what is known do not hold the tip within the limit"

@@ -7,9 +7,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from render.renderer import Renderer
-from scene import Pose, Scene
-from scene.spectrum import Curve
+from conespot.render.renderer import Renderer
+from conespot.scene import Pose, Scene
+from conespot.scene.spectrum import Curve
 
 _NAMES = ("x_bar", "y_bar", "z_bar")
 #: no preview is brightened beyond this white [W m-2 sr-1], 7 cd/m2: an infrared scene is dark, as to the eye

@@ -8,12 +8,12 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from render import kernel
-from render.renderer import Renderer
-from scene import Camera, Scene
-from scene.beam import HardBeam
-from scene.retina import UniformRetina
-from scene.spotlights import spotlight_axes
+from conespot.render import kernel
+from conespot.render.renderer import Renderer
+from conespot.scene import Camera, Scene
+from conespot.scene.beam import HardBeam
+from conespot.scene.retina import UniformRetina
+from conespot.scene.spotlights import spotlight_axes
 
 
 def examine() -> Iterator[str]:

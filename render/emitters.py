@@ -7,11 +7,11 @@ from typing import Any
 
 import numpy as np
 
-from render import spectral
-from scene import Pose, Scene, fundus
-from scene.beam import Beam, HardBeam, LinearBeam
-from scene.pose import Array
-from scene.power import Power
+from conespot.render import spectral
+from conespot.scene import Pose, Scene, fundus
+from conespot.scene.beam import Beam, HardBeam, LinearBeam
+from conespot.scene.pose import Array
+from conespot.scene.power import Power
 
 #: lengths are mm: an intensity [W/sr] over a distance squared [mm2] is an irradiance a million times too small
 _PER_M2 = 1e6

@@ -8,10 +8,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from render import emva
-from render.tile import Crop, Tile
-from scene.emva import Emva
-from scene.sensor import Linear, Sensor, Srgb8
+from conespot.render import readout as emva
+from conespot.render.tile import Crop, Tile
+from conespot.scene.emva import Emva
+from conespot.scene.sensor import Linear, Sensor, Srgb8
 
 
 def encode(radiance: NDArray[np.floating[Any]], sensor: Srgb8 | Linear) -> NDArray[np.uint8] | NDArray[np.uint16]:

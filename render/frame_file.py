@@ -11,11 +11,11 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from render import spectral
-from scene import InputError, Pose, Scene
-from scene.atomic import write_atomically
-from scene.document import dump
-from scene.spectrum import Curve
+from conespot.render import spectral
+from conespot.scene import InputError, Pose, Scene
+from conespot.scene.atomic import write_atomically
+from conespot.scene.document import dump
+from conespot.scene.spectrum import Curve
 
 
 def frame_header(scene: Scene, pose: Pose, power_w: float, versions: Mapping[str, str]) -> dict[str, str | float]:

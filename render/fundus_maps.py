@@ -13,11 +13,11 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from render import fundus_photo, fundus_tree
-from render.fundus_pattern import COARSE, EXTENT, FINE, Map, grid
-from scene import fundus
-from scene.retina import Fundus
-from scene.spectrum import Curve
+from conespot.render import fundus_photo, fundus_tree
+from conespot.render.fundus_anatomy import COARSE, EXTENT, FINE, Map, grid
+from conespot.scene import fundus
+from conespot.scene.retina import Fundus
+from conespot.scene.spectrum import Curve
 
 #: texel and side of the mosaic tile [mm]
 GRAIN = 0.0025

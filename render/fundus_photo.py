@@ -13,8 +13,8 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from render.fundus_pattern import COARSE, FINE, Map, Pattern, grid
-from scene import fundus
+from conespot.render.fundus_anatomy import COARSE, FINE, Map, Pattern, grid
+from conespot.scene import fundus
 
 #: side of a photograph's texel [mm], centre of its round field and of the fovea (x, y), and radius of the field [px]
 TEXEL = 0.01
@@ -64,7 +64,7 @@ def pattern() -> Pattern:
 
 def _linear_photo() -> NDArray[np.float32]:
     """The photograph in linear light, blue first `[H, W, 3]`, with what lies outside its field reflected into it."""
-    data = np.frombuffer(resources.files("render").joinpath("data/retina.jpg").read_bytes(), np.uint8)
+    data = np.frombuffer(resources.files("conespot.render").joinpath("data/retina.jpg").read_bytes(), np.uint8)
     photo = cv2.imdecode(data, cv2.IMREAD_COLOR)
     if photo is None:
         raise RuntimeError("render/data/retina.jpg cannot be decoded: the installation is damaged")

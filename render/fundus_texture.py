@@ -12,10 +12,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from render.fundus_maps import TILE, FundusMaps
-from render.fundus_pattern import EXTENT
-from scene import fundus
-from scene.retina import Fundus
+from conespot.render.fundus_anatomy import EXTENT
+from conespot.render.fundus_maps import TILE, FundusMaps
+from conespot.scene import fundus
+from conespot.scene.retina import Fundus
 
 #: wavelengths of the tables [nm]
 _LOW, _HIGH = 300.0, 1100.0

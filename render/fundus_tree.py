@@ -8,8 +8,8 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from render.fundus_pattern import COARSE, EXTENT, FINE, Map, Pattern, grid, smooth_noise
-from scene import fundus
+from conespot.render.fundus_anatomy import COARSE, EXTENT, FINE, Map, Pattern, grid, smooth_noise
+from conespot.scene import fundus
 
 Array = NDArray[np.float64]
 

@@ -5,10 +5,10 @@ from __future__ import annotations
 import math
 from typing import Any
 
-from render import spectral
-from scene import Eye, Scene
-from scene.eye import Globe
-from scene.retina import Fundus, FundusSite, PhotoRetina
+from conespot.render import spectral
+from conespot.scene import Eye, Scene
+from conespot.scene.eye import Globe
+from conespot.scene.retina import Fundus, FundusSite, PhotoRetina
 
 #: the wall lies this far outside the retina's mesh, relative to the radius, so that the mesh is what light meets
 _BEHIND = 2e-4

@@ -14,12 +14,12 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from render import spectral
-from render.fundus_maps import fundus_maps
-from render.fundus_pattern import EXTENT as MAP_EXTENT
-from render.fundus_texture import fundus_texture
-from scene.retina import Fundus, FundusSite, PhotoRetina, Retina, UniformRetina
-from scene.spectrum import Curve
+from conespot.render import spectral
+from conespot.render.fundus_anatomy import EXTENT as MAP_EXTENT
+from conespot.render.fundus_maps import fundus_maps
+from conespot.render.fundus_texture import fundus_texture
+from conespot.scene.retina import Fundus, FundusSite, PhotoRetina, Retina, UniformRetina
+from conespot.scene.spectrum import Curve
 
 #: side of a texel [mm]: the photograph shows 14 mm on 1411 px
 TEXEL = 0.01
@@ -91,7 +91,7 @@ class Reflectance:
 
 def _photo_map(retina: PhotoRetina) -> NDArray[np.float32]:
     """The photograph's luminance without its uneven illumination, continued beyond its field by reflection."""
-    data = np.frombuffer(resources.files("render").joinpath("data/retina.jpg").read_bytes(), np.uint8)
+    data = np.frombuffer(resources.files("conespot.render").joinpath("data/retina.jpg").read_bytes(), np.uint8)
     photo = cv2.imdecode(data, cv2.IMREAD_COLOR)
     if photo is None:
         raise RuntimeError("render/data/retina.jpg cannot be decoded: the installation is damaged")

@@ -8,15 +8,15 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from render import emitters, kernel, shaft, spectral
-from render.edge import edge_pixels
-from render.tile import Crop, Tile
-from render.view import View
-from scene import Pose, Scene
-from scene.illumination import Light
-from scene.retina import Fundus, FundusSite
-from scene.spectrum import Curve
-from scene.spotlights import spotlight_axes
+from conespot.render import emitters, kernel, shaft, spectral
+from conespot.render.rim import edge_pixels
+from conespot.render.stage import View
+from conespot.render.tile import Crop, Tile
+from conespot.scene import Pose, Scene
+from conespot.scene.illumination import Light
+from conespot.scene.retina import Fundus, FundusSite
+from conespot.scene.spectrum import Curve
+from conespot.scene.spotlights import spotlight_axes
 
 Image = NDArray[np.float32]
 

@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from render.reflectance import Reflectance
-from scene import Scene
+from conespot.render.reflectance import Reflectance
+from conespot.scene import Scene
 
 #: edge of the mesh [mm]: the chord then departs from the sphere by 10 nm, from the paper's bumps by up to 1.7 um
 EDGE = 0.03

@@ -6,10 +6,10 @@ from typing import Any
 
 import numpy as np
 
-from render.tile import Crop
-from scene import Pose, Scene
-from scene.pose import Array
-from scene.spotlights import Shaft
+from conespot.render.tile import Crop
+from conespot.scene import Pose, Scene
+from conespot.scene.pose import Array
+from conespot.scene.spotlights import Shaft
 
 
 def shaft_shapes(mi: Any, shaft: Shaft) -> dict[str, Any]:

@@ -11,12 +11,12 @@ from typing import Any
 
 import numpy as np
 
-from scene import Scene, fundus
-from scene.emva import Emva
-from scene.illumination import Light
-from scene.retina import Fundus, FundusSite
-from scene.sensor import Linear
-from scene.spectrum import Curve
+from conespot.scene import Scene, fundus
+from conespot.scene.emva import Emva
+from conespot.scene.illumination import Light
+from conespot.scene.retina import Fundus, FundusSite
+from conespot.scene.sensor import Linear
+from conespot.scene.spectrum import Curve
 
 #: up to this many points a spectrum is given to Mitsuba as it is
 _FEW_POINTS = 256

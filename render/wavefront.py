@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from render import kernel
+from conespot.render import kernel
 
 
 def trace(loaded: Any, pixels: NDArray[np.uint32], resolution: int, samples: int, seed: int) -> NDArray[np.float32]:

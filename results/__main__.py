@@ -6,8 +6,8 @@ import argparse
 import sys
 from pathlib import Path
 
-from results import summary, write_results
-from scene import InputError
+from conespot.results import summary, write_results
+from conespot.scene import InputError
 
 
 def main(arguments: list[str] | None = None) -> int:

@@ -9,10 +9,10 @@ from typing import Any
 
 from pydantic import TypeAdapter, ValidationError
 
-from scene.beam import Beam, CyclesBeam, LinearBeam, TabulatedBeam
-from scene.document import merge, read_document, shipped
-from scene.power import Power
-from scene.quantity import FROM_FILE, format_quantity
+from conespot.scene.beam import Beam, CyclesBeam, LinearBeam, TabulatedBeam
+from conespot.scene.document import merge, read_document, shipped
+from conespot.scene.power import Power
+from conespot.scene.quantity import FROM_FILE, format_quantity
 
 _NOT_STATED = "not stated"
 _BEAM = TypeAdapter[Any](Beam)

@@ -17,7 +17,7 @@ import pandas as pd
 from numpy.typing import ArrayLike
 from pandas.api.types import is_numeric_dtype
 
-from results.rows import METRICS, Rows
+from conespot.results.rows import METRICS, Rows
 
 WHISKER_IQR = 1.5
 STATISTICS = (

@@ -8,14 +8,14 @@ from typing import Any
 
 import pandas as pd
 
-from results.comparison import Comparison, compare
-from results.comparison_figure import comparison_figure
-from results.light_exposure import light_exposures
-from results.run import load_run
-from results.style import save, style
-from scene import InputError
-from scene.atomic import write_atomically
-from scene.exposure_limits import RetinalExposure
+from conespot.results.comparison import Comparison, compare
+from conespot.results.comparison_figure import comparison_figure
+from conespot.results.light_exposure import light_exposures
+from conespot.results.run import load_run
+from conespot.results.style import save, style
+from conespot.scene import InputError
+from conespot.scene.atomic import write_atomically
+from conespot.scene.exposure_limits import RetinalExposure
 
 
 def compare_runs(folders: Sequence[Path], a: str | None = None, b: str | None = None) -> str:

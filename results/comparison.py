@@ -11,8 +11,8 @@ import pandas as pd
 from numpy.typing import NDArray
 from scipy.stats import binomtest, wilcoxon
 
-from results.rows import Rows
-from scene import InputError
+from conespot.results.rows import Rows
+from conespot.scene import InputError
 
 METRIC = "position_error_mm"
 #: below this many pairs no test can tell (Wilcoxon's smallest p for 5 pairs is 0.06)

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 from matplotlib.figure import Figure
 
-from results.comparison import Comparison
-from results.style import COLOURS, frame, plain_numbers
+from conespot.results.comparison import Comparison
+from conespot.results.style import COLOURS, frame, plain_numbers
 
 _MOST_PANELS = 6
 

@@ -9,13 +9,13 @@ from pathlib import Path
 import pandas as pd
 from matplotlib.figure import Figure
 
-from results.assumptions import assumptions
-from results.pose_figure import pose_figure
-from results.power_figure import power_figure
-from results.run import Run
-from results.style import save, style
-from results.tables import power_in_words, reference_power
-from results.variants import Variant, ordered, split
+from conespot.results.assumptions import assumptions
+from conespot.results.pose_figure import pose_figure
+from conespot.results.power_figure import power_figure
+from conespot.results.run import Run
+from conespot.results.style import save, style
+from conespot.results.tables import power_in_words, reference_power
+from conespot.results.variants import Variant, ordered, split
 
 _MOST_FIGURES = 60
 _BY_POSE = {"box": "figure_8", "helix": "figure_9"}

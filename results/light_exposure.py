@@ -7,12 +7,12 @@ from typing import Any
 import numpy as np
 from pydantic import TypeAdapter, ValidationError
 
-from results.assumptions import scene_of
-from results.run import Run
-from scene import Pose, Scene
-from scene.exposure_limits import RetinalExposure, scene_exposure
-from scene.illumination import LIGHTS
-from scene.quantity import FROM_FILE
+from conespot.results.assumptions import scene_of
+from conespot.results.run import Run
+from conespot.scene import Pose, Scene
+from conespot.scene.exposure_limits import RetinalExposure, scene_exposure
+from conespot.scene.illumination import LIGHTS
+from conespot.scene.quantity import FROM_FILE
 
 _MOST_POSES = 400
 

@@ -11,9 +11,9 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.ticker import MaxNLocator
 
-from results.published import published_means
-from results.style import COLOURS, frame, panel_title, paper_label, plain_numbers
-from results.variants import ordered
+from conespot.results.paper_values import published_means
+from conespot.results.style import COLOURS, frame, panel_title, paper_label, plain_numbers
+from conespot.results.variants import ordered
 
 #: per row of panels: what it shows, its unit, the signed parts, the overall error, its published source
 _PANELS = (

@@ -11,9 +11,9 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
-from results.published import REFERENCE_POWER_W, published_means
-from results.style import COLOURS, frame, panel_title, paper_label, plain_numbers
-from results.variants import ordered
+from conespot.results.paper_values import REFERENCE_POWER_W, published_means
+from conespot.results.style import COLOURS, frame, panel_title, paper_label, plain_numbers
+from conespot.results.variants import ordered
 
 _PANELS = (("Position", "mm", "position_error_mm"), ("Rotation", "deg", "rotation_error_deg"))
 _MOST_RIGS = 4

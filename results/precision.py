@@ -11,10 +11,10 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from results.rows import STATED
-from results.run import Run
-from results.table import Block, Table, number
-from results.variants import by_axes, split
+from conespot.results.rows import STATED
+from conespot.results.run import Run
+from conespot.results.table import Block, Table, number
+from conespot.results.variants import by_axes, split
 
 #: 95 % of chi-squared with three degrees of freedom
 _INSIDE = 7.814727903251179

@@ -9,13 +9,13 @@ from typing import Any
 
 import jinja2
 
-from results.assumptions import assumptions, both_conventions, scene_of
-from results.figures import Drawing
-from results.light_exposure import light_exposures
-from results.published import CITATION
-from results.run import Run
-from results.table import Block, Table, number
-from results.variants import by_axes, ordered, split
+from conespot.results.assumptions import assumptions, both_conventions, scene_of
+from conespot.results.figures import Drawing
+from conespot.results.light_exposure import light_exposures
+from conespot.results.paper_values import CITATION
+from conespot.results.run import Run
+from conespot.results.table import Block, Table, number
+from conespot.results.variants import by_axes, ordered, split
 
 _MOST_LINES = 300
 _MOST_TEXT = 100_000
@@ -24,7 +24,7 @@ _MOST_TEXT = 100_000
 def make_report(run: Run, tables: Sequence[Table], drawings: Sequence[Drawing], left_out: int, figures: Path) -> bytes:
     """The report as HTML. The PNG of the `drawings` stand in the folder `figures`; they are inlined as base64."""
     environment = jinja2.Environment(
-        loader=jinja2.PackageLoader("results", "."),
+        loader=jinja2.PackageLoader("conespot.results", "."),
         autoescape=True,
         undefined=jinja2.StrictUndefined,
         trim_blocks=True,

@@ -14,7 +14,7 @@ import pyarrow.csv
 import pyarrow.parquet
 from pandas.api.types import is_numeric_dtype
 
-from scene import InputError
+from conespot.scene import InputError
 
 NAMES = ("trajectory", "spotlights", "illumination", "surface", "sensor", "localizer")
 #: what makes rows comparable, in the order of design.md; swept keys follow it

@@ -9,9 +9,9 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from results.rows import Rows, find_rows, number_column, read_rows, read_table
-from scene import InputError
-from scene.document import Document, read_document
+from conespot.results.rows import Rows, find_rows, number_column, read_rows, read_table
+from conespot.scene import InputError
+from conespot.scene.document import Document, read_document
 
 THEORY_COLUMNS = ("half_angle_deg", "in_plane_um", "distance_3d_um")
 #: the greatest distance over the whole volume, which a run may give too

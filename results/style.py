@@ -18,7 +18,7 @@ from matplotlib.backends.backend_svg import FigureCanvasSVG
 from matplotlib.figure import Figure
 from matplotlib.ticker import FuncFormatter
 
-from scene.atomic import write_atomically
+from conespot.scene.atomic import write_atomically
 
 #: Okabe and Ito's colours, told apart by colour-blind readers too
 COLOURS = {

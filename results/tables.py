@@ -11,9 +11,8 @@ from typing import Any, NamedTuple
 
 import pandas as pd
 
-from results.assumptions import assumptions, both_conventions, scene_of, theory_assumptions
-from results.precision import precision_table
-from results.published import (
+from conespot.results.assumptions import assumptions, both_conventions, scene_of, theory_assumptions
+from conespot.results.paper_values import (
     BOTH,
     NOTES,
     REFERENCE_POWER_W,
@@ -21,9 +20,10 @@ from results.published import (
     published_theory,
     published_value,
 )
-from results.run import VOLUME_COLUMN, Run
-from results.table import Block, Table, number
-from results.variants import Variant, by_axes, split
+from conespot.results.precision import precision_table
+from conespot.results.run import VOLUME_COLUMN, Run
+from conespot.results.table import Block, Table, number
+from conespot.results.variants import Variant, by_axes, split
 
 QUANTITIES = {"AE": "mean", "ME": "max"}
 TABLE_METRICS = {"position_error_mm": "position [mm]", "rotation_error_deg": "rotation [deg]"}

@@ -13,7 +13,7 @@ from typing import Any
 
 import pandas as pd
 
-from results.rows import GROUP
+from conespot.results.rows import GROUP
 
 #: the paper's own axes, which lie inside a table or figure
 AXES = ("surface", "trajectory", "spotlights", "power_w")

@@ -5,13 +5,13 @@ from __future__ import annotations
 import re
 from pathlib import Path
 
-from results.boxes import box_table, encode_boxes, read_boxes
-from results.figures import draw_figures, plan_figures
-from results.report import make_report
-from results.run import load_run
-from results.tables import make_tables
-from scene import InputError
-from scene.atomic import write_atomically
+from conespot.results.boxes import box_table, encode_boxes, read_boxes
+from conespot.results.figures import draw_figures, plan_figures
+from conespot.results.report import make_report
+from conespot.results.run import load_run
+from conespot.results.tables import make_tables
+from conespot.scene import InputError
+from conespot.scene.atomic import write_atomically
 
 _OURS = {
     "tables": re.compile(r"(table_\d+|power|precision)\.csv|tables\.(txt|md)"),

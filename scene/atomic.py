@@ -6,7 +6,7 @@ import os
 import secrets
 from pathlib import Path
 
-from scene.document import InputError
+from conespot.scene.document import InputError
 
 
 def write_atomically(path: Path, data: bytes) -> None:

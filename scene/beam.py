@@ -13,8 +13,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from pydantic import Field, model_validator
 
-from scene.model import Model
-from scene.quantity import Angle
+from conespot.scene.model import Model
+from conespot.scene.quantity import Angle
 
 Array = NDArray[np.float64]
 _HalfAngle = Annotated[Angle, Field(gt=0.0, lt=math.pi / 2.0)]

@@ -17,7 +17,7 @@ from ruamel.yaml import YAML
 from ruamel.yaml.error import MarkedYAMLError, YAMLError
 from ruamel.yaml.nodes import MappingNode, Node, ScalarNode, SequenceNode
 
-from scene.quantity import FROM_FILE, in_unit_of
+from conespot.scene.quantity import FROM_FILE, in_unit_of
 
 T = TypeVar("T")
 Path_ = tuple[str | int, ...]
@@ -185,18 +185,18 @@ def merge(base: dict[str, Any], over: dict[str, Any]) -> dict[str, Any]:
     return result
 
 
-def shipped(package: str, folder: str) -> dict[str, Path]:
-    """The YAML files that come with a package, by name."""
-    root = Path(str(resources.files(package))) / folder if folder else Path(str(resources.files(package)))
+def shipped(room: str, folder: str) -> dict[str, Path]:
+    """The YAML files that come with a room, by name."""
+    root = Path(str(resources.files(f"conespot.{room}"))) / folder
     return {p.stem: p for p in sorted(root.glob("*.yaml"))}
 
 
-def find_document(name: str, package: str, folder: str, what: str) -> Path:
+def find_document(name: str, room: str, folder: str, what: str) -> Path:
     """The file `name` names: a path that exists, else a shipped one. Raises InputError if neither."""
     path = Path(name)
     if path.exists():
         return path
-    known = shipped(package, folder)
+    known = shipped(room, folder)
     if path.parent == Path() and path.name.removesuffix(".yaml") in known:
         return known[path.name.removesuffix(".yaml")]
     near = difflib.get_close_matches(path.name.removesuffix(".yaml"), list(known), n=1)

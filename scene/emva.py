@@ -8,9 +8,9 @@ from typing import Annotated, Literal
 import numpy as np
 from pydantic import Field, model_validator
 
-from scene.model import Model
-from scene.quantity import Length, Seconds, Wavelength
-from scene.spectrum import Curve, published
+from conespot.scene.model import Model
+from conespot.scene.quantity import Length, Seconds, Wavelength
+from conespot.scene.spectrum import Curve, published
 
 #: elementary charge [C], and h c / e [V nm]: a quantum efficiency times wavelength over it is a responsivity [A/W]
 ELEMENTARY_CHARGE = 1.602176634e-19

@@ -12,10 +12,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from scene.pose import Pose
-from scene.scene import Scene
-from scene.spectrum import Curve, mean_of, published
-from scene.spotlights import spotlight_axes
+from conespot.scene.pose import Pose
+from conespot.scene.scene import Scene
+from conespot.scene.spectrum import Curve, mean_of, published
+from conespot.scene.spotlights import spotlight_axes
 
 LABEL = "2007 edition, research estimate, not a safety assessment"
 #: Group 1 limits [W/m2], halved for endoilluminators: A-weighted 220 uW/cm2, R-weighted 0.7 W/cm2

@@ -8,8 +8,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from pydantic import Field
 
-from scene.model import Model
-from scene.quantity import Length
+from conespot.scene.model import Model
+from conespot.scene.quantity import Length
 
 
 class Eye(Model):

@@ -16,7 +16,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from scene.spectrum import published
+from conespot.scene.spectrum import published
 
 Array = NDArray[np.float64]
 

@@ -11,9 +11,9 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import BeforeValidator, Field, ValidationInfo, model_validator
 
-from scene.csv_lines import csv_lines
-from scene.model import Model
-from scene.quantity import Length
+from conespot.scene.csv_lines import csv_lines
+from conespot.scene.model import Model
+from conespot.scene.quantity import Length
 
 Array = NDArray[np.float64]
 _FEWEST, _MOST = 4, 512  #: nodes a side

@@ -13,9 +13,9 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import BeforeValidator, Field, ValidationInfo, model_validator
 
-from scene.model import Model, unknown_name
-from scene.quantity import Angle, Irradiance, Wavelength
-from scene.spectrum import Curve, published, read_curve
+from conespot.scene.model import Model, unknown_name
+from conespot.scene.quantity import Angle, Irradiance, Wavelength
+from conespot.scene.spectrum import Curve, published, read_curve
 
 _Visible = Annotated[Wavelength, Field(ge=300.0, le=1100.0)]
 _Name = Annotated[str, Field(pattern=r"^[\w .+-]{1,40}$")]

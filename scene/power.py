@@ -7,9 +7,9 @@ from typing import Literal
 
 from pydantic import Field
 
-from scene.beam import Beam
-from scene.model import Model
-from scene.quantity import Watts
+from conespot.scene.beam import Beam
+from conespot.scene.model import Model
+from conespot.scene.quantity import Watts
 
 
 class Power(Model):

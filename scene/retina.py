@@ -6,7 +6,7 @@ from typing import Annotated, Literal
 
 from pydantic import Field, model_validator
 
-from scene.model import Model, named
+from conespot.scene.model import Model, named
 
 _Albedo = Annotated[float, Field(gt=0.0, le=1.0)]
 

@@ -10,18 +10,18 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import model_validator
 
-from scene.beam import Beam, CyclesBeam
-from scene.camera import Camera
-from scene.document import Document, find_document, merge, read_document
-from scene.eye import Eye, Globe
-from scene.illumination import Ambient, FlatBand, Illumination
-from scene.model import Model
-from scene.pose import Pose
-from scene.power import Power
-from scene.retina import PhotoRetina, Retina
-from scene.sensor import Sensor, Srgb8
-from scene.spotlights import RIGS, Instrument, Spotlights, spotlight_axes
-from scene.surface import AnySurface, Surface
+from conespot.scene.beam import Beam, CyclesBeam
+from conespot.scene.camera import Camera
+from conespot.scene.document import Document, find_document, merge, read_document
+from conespot.scene.eye import Eye, Globe
+from conespot.scene.illumination import Ambient, FlatBand, Illumination
+from conespot.scene.model import Model
+from conespot.scene.pose import Pose
+from conespot.scene.power import Power
+from conespot.scene.retina import PhotoRetina, Retina
+from conespot.scene.sensor import Sensor, Srgb8
+from conespot.scene.spotlights import RIGS, Instrument, Spotlights, spotlight_axes
+from conespot.scene.surface import AnySurface, Surface
 
 
 class Scene(Model):

@@ -7,10 +7,10 @@ from typing import Annotated, Literal
 import numpy as np
 from pydantic import Field
 
-from scene.emva import EMVA_PRESETS, Emva
-from scene.model import Model, named
-from scene.quantity import Radiance
-from scene.spectrum import Curve
+from conespot.scene.emva import EMVA_PRESETS, Emva
+from conespot.scene.model import Model, named
+from conespot.scene.quantity import Radiance
+from conespot.scene.spectrum import Curve
 
 _White = Annotated[Radiance, Field(gt=0.0)]
 

@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from scene.csv_lines import csv_lines
+from conespot.scene.csv_lines import csv_lines
 
 Array = NDArray[np.float64]
 
@@ -98,7 +98,7 @@ def mean_of(light: Curve, quantity: Curve) -> float:
 @functools.cache
 def published(table: str, column: str) -> Curve:
     """A column of a table in scene/data; its source stands in the file. Rows where the column is blank are left out."""
-    text = resources.files("scene").joinpath(f"data/{table}.csv").read_text("utf-8")
+    text = resources.files("conespot.scene").joinpath(f"data/{table}.csv").read_text("utf-8")
     rows = csv.DictReader(line for line in text.splitlines() if not line.startswith("#"))
     pairs = np.array([(float(row["wavelength_nm"]), float(row[column])) for row in rows if row[column]])
     return Curve(pairs[:, 0], pairs[:, 1])

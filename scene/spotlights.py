@@ -9,9 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field
 
-from scene.model import Model, named
-from scene.pose import Pose, rot_x, rot_y
-from scene.quantity import Angle, Length
+from conespot.scene.model import Model, named
+from conespot.scene.pose import Pose, rot_x, rot_y
+from conespot.scene.quantity import Angle, Length
 
 
 class Spotlight(Model):

@@ -12,10 +12,10 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from pydantic import Field
 
-from scene.eye import Eye
-from scene.height_map import HeightMap
-from scene.model import Model, named
-from scene.quantity import Length
+from conespot.scene.eye import Eye
+from conespot.scene.height_map import HeightMap
+from conespot.scene.model import Model, named
+from conespot.scene.quantity import Length
 
 Array = NDArray[np.float64]
 _Ratio = Annotated[float, Field(gt=0.5, lt=2.0)]

@@ -11,8 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import BeforeValidator, Field, ValidationInfo
 
-from scene.model import Model, unknown_name
-from scene.quantity import Length, parse_quantity
+from conespot.scene.model import Model, unknown_name
+from conespot.scene.quantity import Length, parse_quantity
 
 Array = NDArray[np.float64]
 Point = tuple[Length, Length, Length]

@@ -18,7 +18,7 @@ pytestmark = pytest.mark.slow
 
 def run_campaign(folder, *arguments):
     done = subprocess.run(
-        [sys.executable, "-m", "campaigns.command", "run", *arguments, "--out", str(folder)],
+        [sys.executable, "-m", "conespot", "run", *arguments, "--out", str(folder)],
         capture_output=True,
         text=True,
         timeout=1200,

@@ -16,10 +16,10 @@ import numpy as np
 import pytest
 from scipy.ndimage import map_coordinates
 
-from render import Renderer
-from scene import Camera, Scene
-from scene.beam import CyclesBeam, HardBeam
-from scene.retina import UniformRetina
+from conespot.render import Renderer
+from conespot.scene import Camera, Scene
+from conespot.scene.beam import CyclesBeam, HardBeam
+from conespot.scene.retina import UniformRetina
 
 SCRIPT = Path(__file__).with_name("blender_scene.py")
 

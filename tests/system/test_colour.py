@@ -5,13 +5,13 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from render import Exposure, Renderer
-from render.colour import colour_preview, observer, render_xyz, to_srgb
-from render.frame_file import frame_header
-from scene import Camera, Scene
-from scene.illumination import LIGHTS, Ambient, FlatBand
-from scene.retina import Fundus, UniformRetina
-from scene.sensor import SENSORS
+from conespot.render import Exposure, Renderer
+from conespot.render.colour import colour_preview, observer, render_xyz, to_srgb
+from conespot.render.frame_file import frame_header
+from conespot.scene import Camera, Scene
+from conespot.scene.illumination import LIGHTS, Ambient, FlatBand
+from conespot.scene.retina import Fundus, UniformRetina
+from conespot.scene.sensor import SENSORS
 
 
 def scene_in(light, retina, **changes):

@@ -6,9 +6,9 @@ import time
 
 import pytest
 
-from scene.document import shipped
+from conespot.scene.document import shipped
 
-CAMPAIGN = [sys.executable, "-m", "campaigns.command"]
+CAMPAIGN = [sys.executable, "-m", "conespot"]
 
 
 def campaign(*arguments, cwd):

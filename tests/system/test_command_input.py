@@ -6,7 +6,7 @@ import sys
 
 import pytest
 
-CAMPAIGN = [sys.executable, "-m", "campaigns.command"]
+CAMPAIGN = [sys.executable, "-m", "conespot"]
 GOOD = "scene: {preset: paper-code, camera: {resolution: 200}}\nposes: 2\n"
 
 

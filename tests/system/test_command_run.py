@@ -9,7 +9,7 @@ import time
 import pandas as pd
 import pytest
 
-CAMPAIGN = [sys.executable, "-m", "campaigns.command"]
+CAMPAIGN = [sys.executable, "-m", "conespot"]
 # many samples: a pose must take long enough to be interrupted
 TEXT = """\
 scene: {preset: paper-code, camera: {resolution: 300}}

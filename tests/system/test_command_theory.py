@@ -6,7 +6,7 @@ import sys
 import pandas as pd
 import pytest
 
-CAMPAIGN = [sys.executable, "-m", "campaigns.command"]
+CAMPAIGN = [sys.executable, "-m", "conespot"]
 FILES = {"table_1.csv", "bounds.csv", "budget.csv", "design.csv", "theory.txt"}
 FILES |= {f"{name}.{kind}" for name in ("budget", "design") for kind in ("png", "svg")}
 

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from render.frame_file import frame_header, read_frame, write_frame, write_preview
-from scene import InputError, load_scene
+from conespot.render.frame_file import frame_header, read_frame, write_frame, write_preview
+from conespot.scene import InputError, load_scene
 
 
 def test_an_exr_frame_reads_back_to_the_bit_with_its_header(tmp_path):

@@ -7,14 +7,14 @@ import math
 import numpy as np
 import pytest
 
-from localize import locate
-from render import Exposure, Renderer
-from scene import Camera, Scene
-from scene.beam import HardBeam
-from scene.illumination import Ambient
-from scene.retina import UniformRetina
-from scene.sensor import Linear
-from scene.trajectory import Helix
+from conespot.localize import locate
+from conespot.render import Exposure, Renderer
+from conespot.scene import Camera, Scene
+from conespot.scene.beam import HardBeam
+from conespot.scene.illumination import Ambient
+from conespot.scene.retina import UniformRetina
+from conespot.scene.sensor import Linear
+from conespot.scene.trajectory import Helix
 
 
 @pytest.mark.parametrize("albedo", [0.125, 0.3])

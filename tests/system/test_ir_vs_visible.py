@@ -5,7 +5,7 @@ from __future__ import annotations
 import pandas as pd
 import pytest
 
-from campaigns.command import main
+from conespot.campaigns.command import main
 
 
 @pytest.fixture(scope="module")

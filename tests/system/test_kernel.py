@@ -9,9 +9,10 @@ from pathlib import Path
 
 import pytest
 
-from render import kernel
+from conespot.render import kernel
 
-REPORT = "from render.kernel import load; print(load()[2])"
+ROOMS = ("scene", "render", "localize", "campaigns", "results")
+REPORT = "from conespot.render.kernel import load; print(load()[2])"
 
 
 def run(code, **environment):
@@ -66,14 +67,13 @@ def test_the_wheels_llvm_is_found_without_any_setting(monkeypatch):
 
 
 def test_scene_and_localize_do_not_import_mitsuba():
-    done = run(
-        "import sys, scene, localize, results, campaigns, render; assert not {'mitsuba', 'drjit'} & set(sys.modules)"
-    )
+    rooms = ", ".join(f"conespot.{room}" for room in ROOMS)
+    done = run(f"import sys, {rooms}; assert not {{'mitsuba', 'drjit'}} & set(sys.modules)")
     assert done.returncode == 0, done.stderr
 
 
 def test_only_the_kernel_imports_mitsuba():
     root = Path(kernel.__file__).parents[1]
-    files = [p for room in ("scene", "render", "localize", "campaigns", "results") for p in (root / room).glob("*.py")]
+    files = [p for room in ROOMS for p in (root / room).rglob("*.py")]
     guilty = [p.name for p in files if "import mitsuba" in p.read_text() or "import drjit" in p.read_text()]
     assert guilty == ["kernel.py"]

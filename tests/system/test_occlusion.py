@@ -7,14 +7,14 @@ import math
 import numpy as np
 import pytest
 
-from localize.forward import moved, window
-from localize.occlusion import covered
-from render import Renderer
-from scene import Camera, Scene
-from scene.illumination import Ambient
-from scene.retina import UniformRetina
-from scene.spotlights import Instrument, Shaft
-from scene.surface import Surface
+from conespot.localize.model.forward import moved, window
+from conespot.localize.model.occlusion import covered
+from conespot.render import Renderer
+from conespot.scene import Camera, Scene
+from conespot.scene.illumination import Ambient
+from conespot.scene.retina import UniformRetina
+from conespot.scene.spotlights import Instrument, Shaft
+from conespot.scene.surface import Surface
 
 SIDE = 300
 TIPS = {"beside the middle": [3.0, 1.0, 4.0], "low": [-2.0, -1.5, 1.0]}

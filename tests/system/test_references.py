@@ -13,11 +13,11 @@ import numpy as np
 import pytest
 from scipy.stats import t
 
-from render import Renderer
-from scene import Camera, Scene
-from scene.illumination import LIGHTS
-from scene.retina import Fundus
-from scene.sensor import SENSORS
+from conespot.render import Renderer
+from conespot.scene import Camera, Scene
+from conespot.scene.illumination import LIGHTS
+from conespot.scene.retina import Fundus
+from conespot.scene.sensor import SENSORS
 
 FOLDER = Path(__file__).parents[1] / "data"
 NAMES = {"visible": ("led-b3", "cmv12000-mono"), "infrared": ("ir850", "cmv12000-nir")}

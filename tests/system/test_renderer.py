@@ -9,19 +9,19 @@ import numpy as np
 import pytest
 from scipy.stats import t
 
-from render import Crop, Exposure, Renderer
-from render.edge import edge_pixels
-from render.exposure import encode
-from render.reflectance import EXTENT, TEXEL, Reflectance
-from render.retina_mesh import from_arc, to_arc
-from scene import Camera, Eye, Pose, Scene
-from scene.beam import CyclesBeam, HardBeam, LinearBeam, TabulatedBeam
-from scene.illumination import LIGHTS, Ambient
-from scene.power import Power
-from scene.retina import FundusSite, PhotoRetina, UniformRetina
-from scene.sensor import Linear, Srgb8
-from scene.spotlights import RIGS, Instrument, Shaft, spotlight_axes
-from scene.surface import Bump, Surface, bump_grid
+from conespot.render import Crop, Exposure, Renderer
+from conespot.render.exposure import encode
+from conespot.render.reflectance import EXTENT, TEXEL, Reflectance
+from conespot.render.retina_mesh import from_arc, to_arc
+from conespot.render.rim import edge_pixels
+from conespot.scene import Camera, Eye, Pose, Scene
+from conespot.scene.beam import CyclesBeam, HardBeam, LinearBeam, TabulatedBeam
+from conespot.scene.illumination import LIGHTS, Ambient
+from conespot.scene.power import Power
+from conespot.scene.retina import FundusSite, PhotoRetina, UniformRetina
+from conespot.scene.sensor import Linear, Srgb8
+from conespot.scene.spotlights import RIGS, Instrument, Shaft, spotlight_axes
+from conespot.scene.surface import Bump, Surface, bump_grid
 
 BEAMS = {
     "hard": HardBeam(),
@@ -167,7 +167,7 @@ def test_sum_of_tiles_times_power_is_one_render_at_that_power():
     """z-test per pixel, Sidak-corrected: the tiled frame against brute force with all lights in one scene."""
     import mitsuba as mi
 
-    from render import emitters
+    from conespot.render import emitters
 
     scene = scene_of(spotlights=RIGS["triple"], retina=PhotoRetina(), camera=Camera(resolution=300))
     pose = scene.pose(np.array([0.8, 0.4, 4.0]))
@@ -385,7 +385,8 @@ def test_a_beam_is_refined_where_it_is_steep_and_nowhere_else():
 
 def test_a_pixel_is_the_same_whatever_else_is_rendered_and_in_however_many_passes(monkeypatch):
     """A crop against one pixel in three of it, and against passes of 1,000 samples: equal to the bit."""
-    from render import kernel, view
+    from conespot.render import kernel
+    from conespot.render import stage as view
 
     assert kernel.load()[2].vectorized
     renderer = Renderer(scene_of(retina=PhotoRetina()), samples=16)

@@ -5,16 +5,16 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from localize import locate
-from localize.occlusion import covered
-from localize.prior import Knowns
-from localize.theory import patch_pixels
-from render import Exposure, Renderer
-from scene import Camera, Scene
-from scene.beam import CyclesBeam, HardBeam
-from scene.retina import PhotoRetina
-from scene.sensor import Linear
-from scene.spotlights import RIGS, Instrument, Shaft
+from conespot.localize import locate
+from conespot.localize.model.occlusion import covered
+from conespot.localize.model.prior import Knowns
+from conespot.localize.theory.bounds import patch_pixels
+from conespot.render import Exposure, Renderer
+from conespot.scene import Camera, Scene
+from conespot.scene.beam import CyclesBeam, HardBeam
+from conespot.scene.retina import PhotoRetina
+from conespot.scene.sensor import Linear
+from conespot.scene.spotlights import RIGS, Instrument, Shaft
 
 KNOWNS = Knowns(rcm_sigma_mm=None)
 #: light, rig, tip [mm], largest error [mm]: hard edges to a micrometre or two, a soft one on texture to tens of them

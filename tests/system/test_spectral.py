@@ -13,18 +13,17 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-import render.reflectance
-from render import Crop, Renderer, kernel
-from render.fundus_maps import FundusMaps
-from scene import Camera, Eye, Scene, fundus
-from scene.beam import HardBeam
-from scene.emva import BandPass, Emva
-from scene.eye import Globe
-from scene.illumination import LIGHTS, Ambient, FlatBand, Line
-from scene.power import Power
-from scene.retina import RETINAS, Fundus, FundusSite, Glint, UniformRetina
-from scene.sensor import SENSORS, Linear
-from scene.spectrum import Curve, published
+from conespot.render import Crop, Renderer, kernel
+from conespot.render.fundus_maps import FundusMaps
+from conespot.scene import Camera, Eye, Scene, fundus
+from conespot.scene.beam import HardBeam
+from conespot.scene.emva import BandPass, Emva
+from conespot.scene.eye import Globe
+from conespot.scene.illumination import LIGHTS, Ambient, FlatBand, Line
+from conespot.scene.power import Power
+from conespot.scene.retina import RETINAS, Fundus, FundusSite, Glint, UniformRetina
+from conespot.scene.sensor import SENSORS, Linear
+from conespot.scene.spectrum import Curve, published
 
 DATA = Path(__file__).parents[1] / "data"
 #: stated values of the closed form at the perifovea [%]
@@ -106,7 +105,7 @@ def test_rendered_vessels_have_the_stated_density(monkeypatch):
         vein=stripes(110.0, 35, 60),
         mosaic=np.zeros((8, 8), np.float32),
     )
-    monkeypatch.setattr(render.reflectance, "fundus_maps", lambda retina: maps)
+    monkeypatch.setattr("conespot.render.reflectance.fundus_maps", lambda retina: maps)
     seen = background_spectrum(Fundus(water=False), list(VESSELS))
     artery, clear, vein = (seen[:, s].mean(axis=(0, 1)) for s in (slice(2, 10), slice(15, 17), slice(22, 30)))
     assert clear == pytest.approx(fundus.reflectance(np.array(list(VESSELS), float), site), rel=0.01)
@@ -259,11 +258,11 @@ def test_float32_is_enough_for_the_geometry():
 
 SCALAR = """
 import numpy as np, sys
-from render import Crop, Renderer
-from scene import Camera, Scene
-from scene.illumination import LIGHTS, Ambient
-from scene.retina import Fundus
-from scene.sensor import SENSORS
+from conespot.render import Crop, Renderer
+from conespot.scene import Camera, Scene
+from conespot.scene.illumination import LIGHTS, Ambient
+from conespot.scene.retina import Fundus
+from conespot.scene.sensor import SENSORS
 light = LIGHTS["led-b3"]
 scene = Scene(camera=Camera(resolution=24), retina=Fundus(source="procedural", detail=0.0), illumination=light,
               ambient=Ambient(illumination=light), sensor=SENSORS["cmv12000-rgb"])

@@ -8,17 +8,17 @@ import cv2
 import numpy as np
 import pytest
 
-from localize import locate
-from localize.prior import Knowns
-from render import Exposure, Renderer, kernel
-from render.retina_mesh import retina_mesh
-from scene import Camera, Scene
-from scene.beam import HardBeam
-from scene.height_map import ReliefMap
-from scene.power import Power
-from scene.retina import UniformRetina
-from scene.sensor import Linear
-from scene.surface import Surface, bump_grid
+from conespot.localize import locate
+from conespot.localize.model.prior import Knowns
+from conespot.render import Exposure, Renderer, kernel
+from conespot.render.retina_mesh import retina_mesh
+from conespot.scene import Camera, Scene
+from conespot.scene.beam import HardBeam
+from conespot.scene.height_map import ReliefMap
+from conespot.scene.power import Power
+from conespot.scene.retina import UniformRetina
+from conespot.scene.sensor import Linear
+from conespot.scene.surface import Surface, bump_grid
 
 
 def drusen():

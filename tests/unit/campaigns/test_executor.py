@@ -7,11 +7,11 @@ import warnings
 
 import pytest
 
-from campaigns.ending import RunError
-from campaigns.executor import execute
-from campaigns.plan import make_plan
-from campaigns.row import Finding, Record
-from campaigns.schema import read_campaign
+from conespot.campaigns.ending import RunError
+from conespot.campaigns.executor import execute
+from conespot.campaigns.plan import make_plan
+from conespot.campaigns.row import Finding, Record
+from conespot.campaigns.schema import read_campaign
 
 
 class FakeBench:

@@ -5,12 +5,12 @@ import math
 import numpy as np
 import pytest
 
-from campaigns.bench import knowns
-from campaigns.knowledge import Knowledge
-from campaigns.plan import frame_seed, make_plan, told
-from campaigns.schema import base, read_campaign, resolved
-from scene import InputError, Scene
-from scene.document import dump
+from conespot.campaigns.bench import knowns
+from conespot.campaigns.knowledge import Knowledge
+from conespot.campaigns.plan import frame_seed, make_plan, told
+from conespot.campaigns.schema import base, read_campaign, resolved
+from conespot.scene import InputError, Scene
+from conespot.scene.document import dump
 
 SWEPT = """\
 scene: paper

@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 
-from campaigns.plan import frame_seed, make_plan, tile_seed
-from campaigns.schema import override, read_campaign
-from campaigns.summary import summary
-from scene import InputError
+from conespot.campaigns.plan import frame_seed, make_plan, tile_seed
+from conespot.campaigns.plan_words import summary
+from conespot.campaigns.schema import override, read_campaign
+from conespot.scene import InputError
 
 
 @pytest.fixture

@@ -2,7 +2,7 @@
 
 import io
 
-from campaigns.progress import Progress
+from conespot.campaigns.progress import Progress
 
 
 class Clock:

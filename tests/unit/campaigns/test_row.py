@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from pydantic import ValidationError
 
-from campaigns.row import Finding, Record, errors
-from scene import Pose
+from conespot.campaigns.row import Finding, Record, errors
+from conespot.scene import Pose
 
 RCM = (6.0, 0.0, 22.0)
 

@@ -2,10 +2,10 @@
 
 import pytest
 
-from campaigns.plan import make_plan
-from campaigns.schema import MAX_COMBINATIONS, base, combinations, override, read_campaign, resolved
-from scene import InputError
-from scene.document import dump, shipped
+from conespot.campaigns.plan import make_plan
+from conespot.campaigns.schema import MAX_COMBINATIONS, base, combinations, override, read_campaign, resolved
+from conespot.scene import InputError
+from conespot.scene.document import dump, shipped
 
 POWER_SWEEP = """\
 name: small

@@ -5,13 +5,13 @@ import errno
 import pandas as pd
 import pytest
 
-from campaigns.ending import RunError
-from campaigns.plan import make_plan
-from campaigns.row import Finding, Record
-from campaigns.schema import read_campaign
-from campaigns.store import open_store
-from scene import InputError
-from scene.document import read_document
+from conespot.campaigns.ending import RunError
+from conespot.campaigns.plan import make_plan
+from conespot.campaigns.row import Finding, Record
+from conespot.campaigns.schema import read_campaign
+from conespot.campaigns.store import open_store
+from conespot.scene import InputError
+from conespot.scene.document import read_document
 
 CAMPAIGN = (
     "scene: paper\nposes: 4\nlocalizers: [paper, paper-code]\nsweep: {scene.power.value: [0.5 W, 1 W], seed: [1, 2]}\n"

@@ -5,10 +5,10 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from scene import Scene, load_scene
-from scene.camera import Camera
-from scene.retina import UniformRetina
-from scene.spotlights import RIGS, spotlight_axes
+from conespot.scene import Scene, load_scene
+from conespot.scene.camera import Camera
+from conespot.scene.retina import UniformRetina
+from conespot.scene.spotlights import RIGS, spotlight_axes
 
 
 def make_scene(preset="paper-code", *, resolution=1000, rig="single", **parts):

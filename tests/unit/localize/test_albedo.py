@@ -5,13 +5,13 @@ import math
 import numpy as np
 import pytest
 
-from localize import Knowns
-from localize.albedo import FUNDUS, Modes
-from localize.prior import Estimate
-from localize.roughness import Roughness
-from localize.view import Grid, Window
-from scene.camera import Camera
-from scene.scene import Scene
+from conespot.localize import Knowns
+from conespot.localize.field.albedo import FUNDUS, Modes
+from conespot.localize.field.roughness import Roughness
+from conespot.localize.model.prior import Estimate
+from conespot.localize.model.view import Grid, Window
+from conespot.scene.camera import Camera
+from conespot.scene.scene import Scene
 
 
 def test_the_modes_products_are_those_of_their_sums():

@@ -3,12 +3,12 @@
 import numpy as np
 import pytest
 
-from localize.forward import light, look, moved, tangents, window
-from localize.profile import Profile
-from scene.beam import CyclesBeam, HardBeam, LinearBeam, TabulatedBeam
-from scene.camera import Camera
-from scene.pose import Pose
-from scene.scene import Scene
+from conespot.localize.model.forward import light, look, moved, tangents, window
+from conespot.localize.model.profile import Profile
+from conespot.scene.beam import CyclesBeam, HardBeam, LinearBeam, TabulatedBeam
+from conespot.scene.camera import Camera
+from conespot.scene.pose import Pose
+from conespot.scene.scene import Scene
 
 BEAMS = [
     (HardBeam(), 0.04),

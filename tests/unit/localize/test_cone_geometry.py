@@ -3,10 +3,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from localize.cone_geometry import Candidates, cone_over_ellipse, fitted_plane, retina_points
-from localize.ellipse import Ellipse, fit_ellipse
-from scene import Camera, Eye, load_scene
-from scene.trajectory import Box, Helix
+from conespot.localize.published.cone_geometry import Candidates, cone_over_ellipse, fitted_plane, retina_points
+from conespot.localize.published.ellipse import Ellipse, fit_ellipse
+from conespot.scene import Camera, Eye, load_scene
+from conespot.scene.trajectory import Box, Helix
 
 half_angles = st.floats(np.radians(5.0), np.radians(15.0))
 

@@ -7,12 +7,12 @@ import pytest
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
-from localize.outline import fit_outline
-from localize.prior import Knowns
-from scene.beam import HardBeam
-from scene.camera import Camera
-from scene.scene import Scene
-from scene.spotlights import RIGS
+from conespot.localize.model.outline import fit_outline
+from conespot.localize.model.prior import Knowns
+from conespot.scene.beam import HardBeam
+from conespot.scene.camera import Camera
+from conespot.scene.scene import Scene
+from conespot.scene.spotlights import RIGS
 
 FREE = Knowns(rcm_sigma_mm=None)
 
@@ -60,13 +60,13 @@ def test_half_an_outline_is_enough_without_noise(kind):
 
 
 def pose_near(pose):
-    from localize.forward import moved
+    from conespot.localize.model.forward import moved
 
     return moved(pose, np.array([0.03, -0.02, 0.04, 0.005, -0.004]))
 
 
 def test_three_outlines_tell_the_roll():
-    from localize.forward import moved
+    from conespot.localize.model.forward import moved
 
     scene = Scene(spotlights=RIGS["triple"], beam=HardBeam())
     straight = scene.pose(np.array([-1.0, 0.5, 3.5]))

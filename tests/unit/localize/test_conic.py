@@ -5,8 +5,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from localize.conic import ConeSphere, table_1, volume_distance
-from scene import Eye
+from conespot.localize.theory.conic import ConeSphere, table_1, volume_distance
+from conespot.scene import Eye
 
 PAPER = {5: 0.08, 7: 0.23, 9: 0.49, 11: 0.91, 13: 1.51, 15: 2.34}
 

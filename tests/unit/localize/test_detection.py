@@ -2,8 +2,8 @@ import cv2
 import numpy as np
 import pytest
 
-from localize.detection import CODED_MEDIAN, CODED_THRESHOLD, coded_mask, otsu_mask, outlines
-from localize.outcome import CUT_BY_BORDER, FEWER_PATCHES, NOTHING_FOUND
+from conespot.localize.outcome import CUT_BY_BORDER, FEWER_PATCHES, NOTHING_FOUND
+from conespot.localize.published.detection import CODED_MEDIAN, CODED_THRESHOLD, coded_mask, otsu_mask, outlines
 
 
 def disc(side, *circles):

@@ -7,19 +7,19 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from localize import Knowns, SensorNoise
-from localize.edge import fit_edge
-from localize.forward import ambient_irradiance, light, look, moved, window
-from localize.noise import noise_of
-from localize.profile import Profile
-from localize.saturated import SaturatedFit
-from localize.strips import Strips, score_covariance
-from localize.theory import cramer_rao
-from scene import Scene
-from scene.beam import CyclesBeam, HardBeam, LinearBeam
-from scene.camera import Camera
-from scene.sensor import Linear, Srgb8
-from scene.surface import Surface
+from conespot.localize import Knowns, SensorNoise
+from conespot.localize.edge.fit import fit_edge
+from conespot.localize.edge.saturated import SaturatedFit
+from conespot.localize.edge.strips import Strips, score_covariance
+from conespot.localize.model.forward import ambient_irradiance, light, look, moved, window
+from conespot.localize.model.noise import noise_of
+from conespot.localize.model.profile import Profile
+from conespot.localize.theory.bounds import cramer_rao
+from conespot.scene import Scene
+from conespot.scene.beam import CyclesBeam, HardBeam, LinearBeam
+from conespot.scene.camera import Camera
+from conespot.scene.sensor import Linear, Srgb8
+from conespot.scene.surface import Surface
 
 PEAK, AMBIENT, READ = 9000.0, 200.0, 15.0
 NOISE = SensorNoise(levels=4095, electrons=1.25 * PEAK, read=READ)

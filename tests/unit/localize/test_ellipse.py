@@ -4,7 +4,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from localize.ellipse import fit_ellipse
+from conespot.localize.published.ellipse import fit_ellipse
 
 
 def points_on(centre, a, b, angle, count=90, arc=2 * np.pi):

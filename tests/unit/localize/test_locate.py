@@ -4,12 +4,11 @@ import sys
 import numpy as np
 import pytest
 
-import localize
-from localize import LOCALIZERS, Localization, LocalizationFailure, locate
-from localize.outcome import CUT_BY_BORDER, FEWER_PATCHES, NEAR_CIRCLE, NO_INTERSECTION, NOTHING_FOUND
-from scene import Eye, InputError
-from scene.sensor import Linear
-from scene.spotlights import Instrument
+from conespot.localize import LOCALIZERS, Localization, LocalizationFailure, locate
+from conespot.localize.outcome import CUT_BY_BORDER, FEWER_PATCHES, NEAR_CIRCLE, NO_INTERSECTION, NOTHING_FOUND
+from conespot.scene import Eye, InputError
+from conespot.scene.sensor import Linear
+from conespot.scene.spotlights import Instrument
 
 PUBLISHED = ["paper", "paper-code", "paper-code-float"]
 TIP = np.array([-1.5, 1.0, 6.0])
@@ -164,8 +163,8 @@ def test_a_round_patch_does_not_tell_where_one_cone_leans(frames):
 def test_it_works_where_mitsuba_is_not():
     code = (
         "import sys; sys.modules['mitsuba'] = sys.modules['drjit'] = None; "
-        "import localize; assert 'render' not in sys.modules; print(list(localize.LOCALIZERS))"
+        "import conespot.localize; assert 'conespot.render' not in sys.modules"
     )
     ran = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
     assert ran.returncode == 0, ran.stderr
-    assert set(localize.LOCALIZERS) >= {*PUBLISHED, "paper-code-oracle"}
+    assert set(LOCALIZERS) >= {*PUBLISHED, "paper-code-oracle"}

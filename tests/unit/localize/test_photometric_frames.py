@@ -7,16 +7,16 @@ import cv2
 import numpy as np
 import pytest
 
-from localize import Knowns, Localization, Reference, SensorNoise, locate
-from localize.calibration import NAMES, calibrate
-from localize.sequence import locate_sequence
-from localize.theory import cramer_rao
-from scene import InputError, Pose
-from scene.beam import CyclesBeam, HardBeam
-from scene.camera import Camera
-from scene.scene import Scene
-from scene.sensor import Linear
-from scene.spotlights import spotlight_axes
+from conespot.localize import Knowns, Localization, Reference, SensorNoise, locate
+from conespot.localize.calibration import NAMES, calibrate
+from conespot.localize.sequence import locate_sequence
+from conespot.localize.theory.bounds import cramer_rao
+from conespot.scene import InputError, Pose
+from conespot.scene.beam import CyclesBeam, HardBeam
+from conespot.scene.camera import Camera
+from conespot.scene.scene import Scene
+from conespot.scene.sensor import Linear
+from conespot.scene.spotlights import spotlight_axes
 
 PEAK, AMBIENT, READ = 9000.0, 200.0, 15.0
 WHITE = 1.25 * PEAK

@@ -6,16 +6,16 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from localize import locate
-from localize.authors_code import coded_candidates
-from localize.cone_geometry import Candidates
-from localize.detection import coded_mask, otsu_mask, outlines
-from localize.outcome import NO_ELLIPSE
-from localize.published import from_rcm, least_spread, text_candidates
-from scene import Pose
-from scene.beam import HardBeam
-from scene.spotlights import Instrument, Spotlight
-from scene.trajectory import Helix
+from conespot.localize import locate
+from conespot.localize.outcome import NO_ELLIPSE
+from conespot.localize.published.authors_code import coded_candidates
+from conespot.localize.published.cone_geometry import Candidates
+from conespot.localize.published.detection import coded_mask, otsu_mask, outlines
+from conespot.localize.published.methods import from_rcm, least_spread, text_candidates
+from conespot.scene import Pose
+from conespot.scene.beam import HardBeam
+from conespot.scene.spotlights import Instrument, Spotlight
+from conespot.scene.trajectory import Helix
 
 FLOATING = ["paper", "paper-code-float"]
 TIPS = [np.array(t) for t in ((-1.5, 1.0, 6.0), (2.0, -1.2, 3.5), (0.4, 2.3, 5.0), (-2.5, -2.5, 3.0))]

@@ -5,11 +5,11 @@ import math
 import numpy as np
 import pytest
 
-from localize.sequence import AmbientMap
-from scene import InputError
-from scene.beam import CyclesBeam
-from scene.emva import Emva
-from scene.sensor import Linear
+from conespot.localize.sequence import AmbientMap
+from conespot.scene import InputError
+from conespot.scene.beam import CyclesBeam
+from conespot.scene.emva import Emva
+from conespot.scene.sensor import Linear
 
 
 @pytest.fixture

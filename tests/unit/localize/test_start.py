@@ -8,17 +8,17 @@ import cv2
 import numpy as np
 import pytest
 
-from localize.outcome import Localization, LocalizationFailure
-from localize.rays import rays_across, support
-from localize.rig import poses_on
-from localize.rings import Overview, Ring, find_rings
-from localize.start import ELSEWHERE, NOTHING, TWO_PLACES, Start, believed, find_start, find_starts
-from scene import Pose
-from scene.beam import CyclesBeam, HardBeam, LinearBeam
-from scene.camera import Camera
-from scene.scene import Scene
-from scene.sensor import Linear
-from scene.spotlights import spotlight_axes
+from conespot.localize.outcome import Localization, LocalizationFailure
+from conespot.localize.start.rays import rays_across, support
+from conespot.localize.start.rig import poses_on
+from conespot.localize.start.rings import Overview, Ring, find_rings
+from conespot.localize.start.search import ELSEWHERE, NOTHING, TWO_PLACES, Start, believed, find_start, find_starts
+from conespot.scene import Pose
+from conespot.scene.beam import CyclesBeam, HardBeam, LinearBeam
+from conespot.scene.camera import Camera
+from conespot.scene.scene import Scene
+from conespot.scene.sensor import Linear
+from conespot.scene.spotlights import spotlight_axes
 
 SIDE = 600
 DISC = (3.4, 0.6)  # [mm]

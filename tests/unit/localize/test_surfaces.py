@@ -7,15 +7,15 @@ import pytest
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
-from localize.forward import look, moved
-from localize.outline import fit_outline
-from localize.prior import Knowns
-from localize.theory import smoothed_over
-from scene.beam import HardBeam
-from scene.camera import Camera
-from scene.height_map import ReliefMap
-from scene.scene import Scene
-from scene.surface import Bump, Surface, bump_grid
+from conespot.localize.model.forward import look, moved
+from conespot.localize.model.outline import fit_outline
+from conespot.localize.model.prior import Knowns
+from conespot.localize.theory.bounds import smoothed_over
+from conespot.scene.beam import HardBeam
+from conespot.scene.camera import Camera
+from conespot.scene.height_map import ReliefMap
+from conespot.scene.scene import Scene
+from conespot.scene.surface import Bump, Surface, bump_grid
 
 FREE = Knowns(rcm_sigma_mm=None)
 #: heights of 0 to 60 um over 10 mm, blurred by nothing but the spline: slopes up to 0.2

@@ -5,15 +5,15 @@ import math
 import numpy as np
 import pytest
 
-from localize.assessment import electrons_of, tied
-from localize.outline import fit_outline
-from localize.prior import Knowns
-from localize.theory import Electrons, cramer_rao, smoothed_over
-from scene.camera import Camera
-from scene.emva import Emva
-from scene.scene import Scene
-from scene.sensor import Linear
-from scene.surface import bump_grid
+from conespot.localize.model.outline import fit_outline
+from conespot.localize.model.prior import Knowns
+from conespot.localize.theory.assessment import electrons_of, tied
+from conespot.localize.theory.bounds import Electrons, cramer_rao, smoothed_over
+from conespot.scene.camera import Camera
+from conespot.scene.emva import Emva
+from conespot.scene.scene import Scene
+from conespot.scene.sensor import Linear
+from conespot.scene.surface import bump_grid
 
 TIP = np.array([0.0, 0.0, 6.0])  # its outline crosses a bump
 

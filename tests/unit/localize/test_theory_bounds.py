@@ -5,11 +5,11 @@ import math
 import numpy as np
 import pytest
 
-from localize.prior import Knowns
-from localize.theory import cramer_rao, error_budget
-from scene.beam import CyclesBeam, HardBeam
-from scene.camera import Camera
-from scene.scene import Scene
+from conespot.localize.model.prior import Knowns
+from conespot.localize.theory.bounds import cramer_rao, error_budget
+from conespot.scene.beam import CyclesBeam, HardBeam
+from conespot.scene.camera import Camera
+from conespot.scene.scene import Scene
 
 LOW, HIGH = (0.0, 0.0, 3.0), (2.0, 0.0, 6.0)
 

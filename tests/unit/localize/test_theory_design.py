@@ -5,12 +5,12 @@ import math
 import numpy as np
 import pytest
 
-from localize.design import compare_designs, ring
-from scene.beam import HardBeam
-from scene.camera import Camera
-from scene.pose import Pose
-from scene.scene import Scene
-from scene.spotlights import spotlight_axes
+from conespot.localize.theory.design import compare_designs, ring
+from conespot.scene.beam import HardBeam
+from conespot.scene.camera import Camera
+from conespot.scene.pose import Pose
+from conespot.scene.scene import Scene
+from conespot.scene.spotlights import spotlight_axes
 
 SCENE = Scene(beam=HardBeam(), camera=Camera(resolution=500))
 TIPS = ((0.0, 0.0, 3.0), (1.0, 1.0, 4.5))

@@ -5,10 +5,10 @@ import math
 import numpy as np
 import pytest
 
-from localize.outcome import Localization
-from localize.prior import Estimate, Knowns
-from localize.solve import inverse
-from localize.verdict import (
+from conespot.localize.model.prior import Estimate, Knowns
+from conespot.localize.model.solve import inverse
+from conespot.localize.outcome import Localization
+from conespot.localize.verdict import (
     BEHIND,
     COVERED,
     LARGEST_FREE_SIGMA_MM,
@@ -20,9 +20,9 @@ from localize.verdict import (
     UNSETTLED,
     judged,
 )
-from scene import Pose
-from scene.scene import Scene
-from scene.spotlights import RIGS
+from conespot.scene import Pose
+from conespot.scene.scene import Scene
+from conespot.scene.spotlights import RIGS
 
 TIP = np.array([1.0, 0.5, 4.0])
 SIGMAS = np.array([2e-3, 2e-3, 5e-3, 4e-4, 4e-4])

@@ -6,15 +6,15 @@ import numpy as np
 import pytest
 from scipy.stats import poisson as exact_poisson
 
-from render import Crop, Exposure, Tile
-from render.emva import demosaic, expose, metered_time, mosaic, normal_pairs, poisson
-from scene import InputError
-from scene.document import Document
-from scene.emva import EMVA_PRESETS, BandPass, Emva, LongPass, Metering
-from scene.illumination import LIGHTS, FlatBand
-from scene.scene import read_scene
-from scene.sensor import SENSORS, sensor_name
-from scene.spectrum import published
+from conespot.render import Crop, Exposure, Tile
+from conespot.render.readout import demosaic, expose, metered_time, mosaic, normal_pairs, poisson
+from conespot.scene import InputError
+from conespot.scene.document import Document
+from conespot.scene.emva import EMVA_PRESETS, BandPass, Emva, LongPass, Metering
+from conespot.scene.illumination import LIGHTS, FlatBand
+from conespot.scene.scene import read_scene
+from conespot.scene.sensor import SENSORS, sensor_name
+from conespot.scene.spectrum import published
 
 
 def photon_transfer(sensor: Emva, electrons: np.ndarray, seed: int = 1) -> tuple[np.ndarray, np.ndarray]:

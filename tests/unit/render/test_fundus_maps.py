@@ -5,11 +5,11 @@ import functools
 import numpy as np
 import pytest
 
-from render.fundus_maps import fundus_maps
-from render.fundus_pattern import COARSE, EXTENT, Map, grid
-from scene import fundus
-from scene.illumination import LIGHTS
-from scene.retina import Fundus
+from conespot.render.fundus_anatomy import COARSE, EXTENT, Map, grid
+from conespot.render.fundus_maps import fundus_maps
+from conespot.scene import fundus
+from conespot.scene.illumination import LIGHTS
+from conespot.scene.retina import Fundus
 
 SOURCES = {"photo": Fundus(), "procedural": Fundus(source="procedural", seed=1)}
 

@@ -8,9 +8,9 @@ import pandas as pd
 import pytest
 from ruamel.yaml import YAML
 
-from results import style
-from results.rows import COLUMNS
-from scene.document import read_document, shipped
+from conespot.results import style
+from conespot.results.rows import COLUMNS
+from conespot.scene.document import read_document, shipped
 
 POWERS = (0.05, 0.1, 0.15, 0.25, 0.5, 0.75, 1.0)
 

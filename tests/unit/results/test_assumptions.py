@@ -4,8 +4,8 @@ import math
 
 import pytest
 
-from results.assumptions import Assumptions, assumptions, both_conventions, scene_of
-from scene import load_scene
+from conespot.results.assumptions import Assumptions, assumptions, both_conventions, scene_of
+from conespot.scene import load_scene
 
 
 @pytest.fixture

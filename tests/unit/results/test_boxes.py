@@ -9,8 +9,8 @@ from hypothesis import strategies as st
 from matplotlib.cbook import boxplot_stats
 from pandas.api.types import is_numeric_dtype
 
-from results.boxes import STATISTICS, box_statistics, box_table, encode_boxes, read_boxes
-from results.rows import GROUP, METRICS, Rows
+from conespot.results.boxes import STATISTICS, box_statistics, box_table, encode_boxes, read_boxes
+from conespot.results.rows import GROUP, METRICS, Rows
 
 values = st.lists(st.floats(-1e6, 1e6), min_size=1, max_size=60)
 

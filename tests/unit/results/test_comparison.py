@@ -5,11 +5,11 @@ import pandas as pd
 import pytest
 from scipy.stats import wilcoxon
 
-from campaigns.compare import compare as compare_command
-from results.compare_runs import compare_runs
-from results.comparison import compare, interval
-from results.rows import Rows
-from scene import InputError
+from conespot.campaigns.compare import compare as compare_command
+from conespot.results.compare_runs import compare_runs
+from conespot.results.comparison import compare, interval
+from conespot.results.rows import Rows
+from conespot.scene import InputError
 
 
 @pytest.fixture

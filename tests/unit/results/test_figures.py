@@ -6,13 +6,13 @@ import xml.etree.ElementTree as ET
 import numpy as np
 import pytest
 
-from results.boxes import box_table
-from results.figures import draw_figures, plan_figures
-from results.pose_figure import pose_figure
-from results.power_figure import power_figure
-from results.rows import Rows
-from results.run import load_run
-from results.style import style
+from conespot.results.boxes import box_table
+from conespot.results.figures import draw_figures, plan_figures
+from conespot.results.pose_figure import pose_figure
+from conespot.results.power_figure import power_figure
+from conespot.results.rows import Rows
+from conespot.results.run import load_run
+from conespot.results.style import style
 
 
 @pytest.fixture

@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 from scipy.stats import chi2
 
-from results.boxes import box_table
-from results.run import load_run
-from results.tables import make_tables
+from conespot.results.boxes import box_table
+from conespot.results.run import load_run
+from conespot.results.tables import make_tables
 
 SIGMA = 0.004
 

@@ -2,7 +2,7 @@
 
 import pytest
 
-from results.published import BOTH, published_errors, published_means, published_theory, published_value
+from conespot.results.paper_values import BOTH, published_errors, published_means, published_theory, published_value
 
 
 def test_the_whole_of_tables_iv_and_v_is_there():

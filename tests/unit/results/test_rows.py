@@ -4,10 +4,10 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from results import rows as rows_module
-from results.rows import COLUMNS, GROUP, read_rows
-from results.run import load_run
-from scene import InputError
+from conespot.results import rows as rows_module
+from conespot.results.rows import COLUMNS, GROUP, read_rows
+from conespot.results.run import load_run
+from conespot.scene import InputError
 
 
 @pytest.fixture

@@ -6,10 +6,10 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from results.boxes import box_table
-from results.run import Run, load_run
-from results.table import Block, Table
-from results.tables import make_tables, reference_power
+from conespot.results.boxes import box_table
+from conespot.results.run import Run, load_run
+from conespot.results.table import Block, Table
+from conespot.results.tables import make_tables, reference_power
 
 ASSUMED = ["radius", "edge", "power_convention", "transfer", "threshold", "ambiguity"]
 

@@ -11,10 +11,9 @@ from html.parser import HTMLParser
 import pandas as pd
 import pytest
 
-import results.writing
-from results import summary, write_results
-from results.__main__ import main
-from scene import InputError
+from conespot.results import summary, write_results
+from conespot.results.__main__ import main
+from conespot.scene import InputError
 
 
 @pytest.fixture(scope="session")
@@ -150,7 +149,7 @@ def test_an_interrupted_write_leaves_no_half_file(tmp_path, make_run, make_rows,
     def interrupt(*_):
         raise KeyboardInterrupt
 
-    monkeypatch.setattr(results.writing, "draw_figures", interrupt)
+    monkeypatch.setattr("conespot.results.writing.draw_figures", interrupt)
     with pytest.raises(KeyboardInterrupt):
         write_results(folder)
     assert not (folder / "report.html").exists()
@@ -180,7 +179,9 @@ def test_the_command_prints_the_tables(tmp_path, make_run, capsys):
 
 
 def test_the_command_refuses_what_is_no_run_with_exit_code_2(tmp_path):
-    done = subprocess.run([sys.executable, "-m", "results", str(tmp_path)], capture_output=True, text=True, check=False)
+    done = subprocess.run(
+        [sys.executable, "-m", "conespot.results", str(tmp_path)], capture_output=True, text=True, check=False
+    )
     assert (done.returncode, done.stdout) == (2, "")
     assert done.stderr.count("\n") == 1
     assert "no campaign.yaml" in done.stderr

@@ -5,8 +5,8 @@ import stat
 
 import pytest
 
-from scene import InputError
-from scene.atomic import write_atomically
+from conespot.scene import InputError
+from conespot.scene.atomic import write_atomically
 
 
 def test_replaces_the_old_content_and_leaves_nothing_else(tmp_path):

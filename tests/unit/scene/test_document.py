@@ -6,11 +6,11 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from scene import InputError, Scene, load_scene
-from scene.document import dump, find_document, merge, read_document
-from scene.model import identity
-from scene.quantity import UNITS, format_quantity, parse_quantity
-from scene.trajectory import AnyTrajectory
+from conespot.scene import InputError, Scene, load_scene
+from conespot.scene.document import dump, find_document, merge, read_document
+from conespot.scene.model import identity
+from conespot.scene.quantity import UNITS, format_quantity, parse_quantity
+from conespot.scene.trajectory import AnyTrajectory
 
 BAD = {
     "eye: {radus: 12 mm}": r"x.yaml:1: eye.radus: unknown key 'radus'; did you mean 'radius'\?",

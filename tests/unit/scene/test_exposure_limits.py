@@ -4,13 +4,13 @@ import math
 
 import pytest
 
-from scene import Scene
-from scene.beam import CyclesBeam, HardBeam
-from scene.exposure_limits import disc_irradiance, exposure, hazard_fractions, peak_irradiance, scene_exposure
-from scene.illumination import LIGHTS, FlatBand
-from scene.pose import Pose
-from scene.power import Power
-from scene.spotlights import RIGS
+from conespot.scene import Scene
+from conespot.scene.beam import CyclesBeam, HardBeam
+from conespot.scene.exposure_limits import disc_irradiance, exposure, hazard_fractions, peak_irradiance, scene_exposure
+from conespot.scene.illumination import LIGHTS, FlatBand
+from conespot.scene.pose import Pose
+from conespot.scene.power import Power
+from conespot.scene.spotlights import RIGS
 
 
 def test_ten_milliwatts_of_white_led():

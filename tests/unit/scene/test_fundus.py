@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from scene import fundus
+from conespot.scene import fundus
 
 TABLE = Path(__file__).parents[2] / "data" / "fundus_reflectance_delori1989.csv"
 PERIFOVEA_PERCENT = {

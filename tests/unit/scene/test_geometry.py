@@ -10,12 +10,12 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.integrate import quad
 
-from scene import Camera, Eye, Pose, Scene, load_scene
-from scene.beam import CyclesBeam, HardBeam, LinearBeam, TabulatedBeam
-from scene.power import Power
-from scene.spotlights import RIGS, spotlight_axes
-from scene.surface import Bump, Surface, bump_grid
-from scene.trajectory import Box, Grid, Helix, Line, Random, Spiral
+from conespot.scene import Camera, Eye, Pose, Scene, load_scene
+from conespot.scene.beam import CyclesBeam, HardBeam, LinearBeam, TabulatedBeam
+from conespot.scene.power import Power
+from conespot.scene.spotlights import RIGS, spotlight_axes
+from conespot.scene.surface import Bump, Surface, bump_grid
+from conespot.scene.trajectory import Box, Grid, Helix, Line, Random, Spiral
 
 RNG = np.random.default_rng(0)
 BEAMS = [

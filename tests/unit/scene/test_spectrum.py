@@ -3,11 +3,11 @@
 import numpy as np
 import pytest
 
-from scene import InputError
-from scene.document import Document
-from scene.illumination import LIGHTS, Ambient, FlatBand, Line, MeasuredLight
-from scene.scene import Scene, read_scene
-from scene.spectrum import Curve, mean_of, published
+from conespot.scene import InputError
+from conespot.scene.document import Document
+from conespot.scene.illumination import LIGHTS, Ambient, FlatBand, Line, MeasuredLight
+from conespot.scene.scene import Scene, read_scene
+from conespot.scene.spectrum import Curve, mean_of, published
 
 
 @pytest.mark.parametrize("name", LIGHTS)

@@ -10,12 +10,12 @@ from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 from scipy.interpolate import CubicSpline
 
-from scene import Camera, Eye, InputError, Scene, load_scene
-from scene.document import read_document
-from scene.height_map import ReliefMap
-from scene.model import identity
-from scene.scene import read_scene
-from scene.surface import Bump, Surface, bump_grid, surface_name
+from conespot.scene import Camera, Eye, InputError, Scene, load_scene
+from conespot.scene.document import read_document
+from conespot.scene.height_map import ReliefMap
+from conespot.scene.model import identity
+from conespot.scene.scene import read_scene
+from conespot.scene.surface import Bump, Surface, bump_grid, surface_name
 
 EYE = Eye(radius=12.5)
 RNG = np.random.default_rng(7)

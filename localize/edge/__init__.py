@@ -1,0 +1,1 @@
+"""The patch's edge, found below the pixel in bands along its predicted outline."""

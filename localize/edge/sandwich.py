@@ -1,0 +1,54 @@
+"""What every fit of an edge answers: where it stands, and a covariance that its residuals show."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from conespot.localize.model.prior import Estimate
+from conespot.localize.model.solve import inverse
+
+Array = NDArray[np.float64]
+#: a last step longer than this, in sigmas of the fit, means that the fit does not settle
+SETTLED_SIGMAS = 1.0
+
+
+@dataclass(frozen=True)
+class EdgeFit(ABC):
+    """A fit whose residuals along the outlines err together."""
+
+    estimate: Estimate
+    #: of the pose and the free quantities `[P, P]`, priors included, if all bins or strips erred by themselves
+    information: Array
+    prior: Array  #: the priors' whitened rows `[Q, P]`
+    step: Array  #: the last `[P]`
+    covered: float  #: share of the outlines that was looked at
+
+    @property
+    @abstractmethod
+    def misfit(self) -> float:
+        """Rms of the residuals, outliers cut, over what the model expects."""
+
+    @abstractmethod
+    def scatter(self) -> Array:
+        """Covariance of the gradient `[P, P]` as the residuals show it, priors included."""
+
+    @cached_property
+    def covariance(self) -> Array:
+        """Covariance of the pose and the free quantities `[P, P]`: a sandwich of the two."""
+        bread = inverse(self.information)
+        return np.asarray(bread @ self.scatter() @ bread)
+
+    @property
+    def settled(self) -> bool:
+        """Whether the last step was short."""
+        return float(self.step @ np.linalg.solve(self.covariance, self.step)) < SETTLED_SIGMAS**2
+
+    @property
+    def correlation(self) -> float:
+        """How much larger the covariance is than if all erred by themselves."""
+        return float(np.trace(self.covariance @ self.information)) / len(self.information)

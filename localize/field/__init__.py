@@ -1,0 +1,1 @@
+"""The whole patch, with the retina's albedo as a random field."""

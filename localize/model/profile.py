@@ -1,0 +1,137 @@
+"""Beam profiles averaged over a pixel: the profile's two antiderivatives, piecewise polynomials.
+
+`w` is the variable in which the profile is a piecewise polynomial and which grows towards the axis: the cosine of the
+angle off the axis for hard and Cycles beams, minus the angle for linear and tabulated ones.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from conespot.scene.beam import Beam, CyclesBeam, HardBeam, LinearBeam, TabulatedBeam
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Profile:
+    """A beam profile g(w) as polynomials between knots: 0 before the first, the last one beyond the last."""
+
+    knots: Array  #: increasing `[S]`
+    coefficients: Array  #: of g in (w - knot), constant first, cubic at most `[S, D]`
+    cosine: bool  #: whether w is the cosine; otherwise minus the angle [rad]
+    half_angle: float  #: [rad]
+
+    @classmethod
+    def of(cls, beam: Beam) -> Profile:
+        """The profile of a beam."""
+        b = beam.half_angle
+        if isinstance(beam, HardBeam):
+            return cls(np.array([math.cos(b)]), np.array([[1.0]]), True, b)
+        if isinstance(beam, CyclesBeam):
+            low = math.cos(b)
+            ramp = beam.blend * (1.0 - low)
+            pieces = np.array([[0.0, 0.0, 3.0 / ramp**2, -2.0 / ramp**3], [1.0, 0.0, 0.0, 0.0]])
+            return cls(np.array([low, low + ramp]), pieces, True, b)
+        if isinstance(beam, LinearBeam):
+            angles, values = np.array([beam.beam_width, beam.half_angle]), np.array([1.0, 0.0])
+        else:
+            assert isinstance(beam, TabulatedBeam)
+            angles, values = np.asarray(beam.angles), np.asarray(beam.intensities)
+        w = -angles[::-1]
+        g = values[::-1]
+        slopes = np.append(np.diff(g) / np.diff(w), 0.0)
+        return cls(w, np.stack([g, slopes], axis=1), False, b)
+
+    def variable(self, cosine: Array) -> tuple[Array, Array | float]:
+        """w at cosines of the angle off the axis, and |dw / dcosine|."""
+        if self.cosine:
+            return cosine, 1.0
+        c = np.clip(cosine, -1.0, 1.0)
+        return -np.arccos(c), 1.0 / np.sqrt(np.maximum(1.0 - c * c, 1e-12))
+
+    def angle_at(self, level: float) -> float:
+        """The largest angle off the axis [rad] at which the profile reaches `level` (0..1)."""
+        angles = np.linspace(self.half_angle, 0.0, 2001)
+        w = np.cos(angles) if self.cosine else -angles
+        reached = np.flatnonzero(self._piecewise(self.coefficients, w) >= level)
+        return float(angles[reached[0]]) if len(reached) else 0.0
+
+    def value(self, w: Array) -> Array:
+        """g(w), any shape."""
+        return self._piecewise(self.coefficients, w)
+
+    def mean(self, w: Array, px: Array, py: Array) -> tuple[Array, Array]:
+        """Mean of g over a pixel, and its derivative by w, where w rises by 2 px and 2 py along the pixel's two sides.
+
+        [H(w+p+q) - H(w+p-q) - H(w-p+q) + H(w-p-q)] / 4pq with H'' = g; px, py are half rises, not negative.
+        """
+        mean, slope = np.zeros_like(w), np.zeros_like(w)
+        reach = px + py
+        # beyond the last knot every profile is constant, before the first it is dark
+        mean[w > self.knots[-1] + reach] = self.coefficients[-1, 0]
+        near = np.flatnonzero((w >= self.knots[0] - reach) & (w <= self.knots[-1] + reach))
+        a, p, q, r = w[near], px[near], py[near], reach[near]
+        piece = np.searchsorted(self.knots, a - r, side="right")
+        within = piece == np.searchsorted(self.knots, a + r, side="right")
+        inside, at = near[within], piece[within] - 1
+        # a pixel inside one piece: of a cubic's Taylor series only the second derivative adds to the mean
+        spread = (np.square(p[within]) + np.square(q[within])) / 6.0
+        x = a[within] - self.knots[at]
+        c = self._cubic[:, at]
+        mean[inside] = ((c[3] * x + c[2]) * x + c[1]) * x + c[0] + spread * (2.0 * c[2] + 6.0 * c[3] * x)
+        slope[inside] = (3.0 * c[3] * x + 2.0 * c[2]) * x + c[1] + spread * 6.0 * c[3]
+        across = ~within
+        edge, a, p, q = near[across], a[across], p[across], q[across]
+        floor = np.maximum(1e-3 * np.maximum(p, q), 1e-9)
+        p, q = np.maximum(p, floor), np.maximum(q, floor)
+        area = 4.0 * p * q
+        corners = (a + p + q, a + p - q, a - p + q, a - p - q)
+        h = [self._piecewise(self._twice, corner) for corner in corners]
+        mean[edge] = (h[0] - h[1] - h[2] + h[3]) / area
+        h = [self._piecewise(self._once, corner) for corner in corners]
+        slope[edge] = (h[0] - h[1] - h[2] + h[3]) / area
+        return mean, slope
+
+    @cached_property
+    def _once(self) -> Array:
+        return _integrate(self.knots, self.coefficients)
+
+    @cached_property
+    def _twice(self) -> Array:
+        return _integrate(self.knots, self._once)
+
+    @cached_property
+    def _cubic(self) -> Array:
+        """Coefficients of the pieces, constant first `[4, S]`."""
+        return np.pad(self.coefficients, ((0, 0), (0, 4 - self.coefficients.shape[1]))).T
+
+    def _piecewise(self, coefficients: Array, w: Array) -> Array:
+        if len(self.knots) == 1:
+            x = np.maximum(w - self.knots[0], 0.0)
+            lit = w >= self.knots[0]
+            return _polynomial(coefficients[0], x) * lit
+        piece = np.searchsorted(self.knots, w, side="right") - 1
+        x = w - self.knots[np.maximum(piece, 0)]
+        return np.where(piece >= 0, _polynomial(np.moveaxis(coefficients[np.maximum(piece, 0)], -1, 0), x), 0.0)
+
+
+def _polynomial(coefficients: Array, x: Array) -> Array:
+    result = np.broadcast_to(coefficients[-1], x.shape)
+    for row in coefficients[-2::-1]:
+        result = result * x + row
+    return np.asarray(result)
+
+
+def _integrate(knots: Array, coefficients: Array) -> Array:
+    """Antiderivative, 0 at the first knot and continuous, as polynomials between the same knots."""
+    degree = np.arange(1, coefficients.shape[1] + 1)
+    result = np.concatenate([np.zeros((len(knots), 1)), coefficients / degree], axis=1)
+    for i in range(1, len(knots)):
+        result[i, 0] = np.polyval(result[i - 1, ::-1], knots[i] - knots[i - 1])
+    return result

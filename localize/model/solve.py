@@ -1,0 +1,137 @@
+"""Robust least squares: Gauss-Newton with Levenberg's damping and Student-t weights."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from conespot.localize.model.prior import Estimate
+
+Array = NDArray[np.float64]
+#: degrees of freedom of the Student-t distribution residuals are taken to follow
+STUDENT = 4.0
+
+
+def student_weights(residuals: Array) -> Array:
+    """Weights of iteratively reweighted least squares for whitened residuals that follow Student's t."""
+    return np.asarray((STUDENT + 1.0) / (STUDENT + np.square(residuals)))
+
+
+def student_bend(residuals: Array) -> Array:
+    """Slope of the influence of whitened residuals over their weight: 1 for small ones, -1 for gross errors."""
+    square = np.square(residuals)
+    return np.asarray((STUDENT - square) / (STUDENT + square))
+
+
+def spread(residuals: Array) -> float:
+    """Robust standard deviation: 1.4826 times the median absolute value."""
+    return 1.4826 * float(np.median(np.abs(residuals))) if len(residuals) else 0.0
+
+
+_REST = (1e-4, 0.3)
+
+
+def rest(residuals: Array, variances: Array, before: float) -> float:
+    """What residuals scatter beyond the sensor's `variances`, one step from `before`: albedo nothing else explains."""
+    whole = variances + before**2
+    ratio = spread(residuals / np.sqrt(whole)) ** 2
+    found = before**2 + (ratio - 1.0) * float(np.median(whole))
+    return float(np.sqrt(np.clip(found, _REST[0] ** 2, _REST[1] ** 2)))
+
+
+def reduction(information: Array, size: int) -> Array:
+    """The rows `[size, P]` that take the last parameters out of normal equations `[P, P]`."""
+    return np.concatenate(
+        [np.eye(size), -np.linalg.solve(information[size:, size:], information[size:, :size]).T], axis=1
+    )
+
+
+def solved(information: Array, gradient: Array) -> Array | None:
+    """The solution of normal equations, well scaled; None if they have none."""
+    scale = np.sqrt(np.maximum(np.diag(information), 1e-300))
+    try:
+        step: Array = np.linalg.solve(information / np.outer(scale, scale), gradient / scale) / scale
+    except np.linalg.LinAlgError:
+        return None
+    return step if np.all(np.isfinite(step)) else None
+
+
+def inverse(information: Array) -> Array:
+    """The inverse of an information matrix, well scaled; infinite where it has none."""
+    scale = np.sqrt(np.maximum(np.diag(information), 1e-300))
+    try:
+        return np.asarray(np.linalg.inv(information / np.outer(scale, scale)) / np.outer(scale, scale))
+    except np.linalg.LinAlgError:
+        return np.full_like(information, np.inf)
+
+
+@dataclass(frozen=True)
+class Solution:
+    """A minimum: the estimate, the information matrix there and the whitened residuals of the data."""
+
+    estimate: Estimate
+    information: Array  #: `[P, P]`, priors included
+    residuals: Array  #: `[N]`
+    converged: bool
+
+
+#: whitened residuals `[N]`, Jacobian `[N, P]`, prior residuals `[Q]` and rows `[Q, P]` at an estimate
+Problem = Callable[[Estimate], tuple[Array, Array, Array, Array]]
+
+
+def minimize(
+    problem: Problem,
+    start: Estimate,
+    pose_size: int,
+    free: tuple[str, ...],
+    *,
+    robust: bool = True,
+    iterations: int = 30,
+    tolerance: float = 1e-9,
+) -> Solution | None:
+    """The estimate that minimizes the (Student-t) cost; None when the problem is singular."""
+    estimate, damping = start, 1e-6
+    r, jac, pr, pj = problem(estimate)
+    cost = _cost(r, pr, robust)
+    converged = False
+    for _ in range(iterations):
+        if len(r) + len(pr) < 5 or not np.isfinite(cost):
+            return None
+        w = student_weights(r) if robust else np.ones_like(r)
+        information = (jac * w[:, None]).T @ jac + pj.T @ pj
+        gradient = (jac * w[:, None]).T @ r + pj.T @ pr
+        size = np.sqrt(np.maximum(np.diag(information), 1e-300))
+        scaled = information / np.outer(size, size)
+        for _ in range(8):
+            try:
+                step = -np.linalg.solve(scaled + damping * np.eye(len(size)), gradient / size) / size
+            except np.linalg.LinAlgError:
+                return None
+            if not np.all(np.isfinite(step)) or float(np.linalg.norm(step[3:pose_size])) > 1.0:
+                damping = max(damping * 10.0, 1e-3)
+                continue
+            trial = estimate.moved(step, pose_size, free)
+            new = problem(trial)
+            new_cost = _cost(new[0], new[2], robust)
+            if new_cost <= cost * (1.0 + 1e-12) + 1e-300:
+                break
+            damping = max(damping * 10.0, 1e-3)
+        else:
+            return Solution(estimate, information, r, True)
+        small = float(np.max(np.abs(step[:pose_size]))) < tolerance
+        estimate, (r, jac, pr, pj), cost = trial, new, new_cost
+        damping = max(damping / 10.0, 1e-15)
+        if small:
+            converged = True
+            break
+    w = student_weights(r) if robust else np.ones_like(r)
+    information = (jac * w[:, None]).T @ jac + pj.T @ pj
+    return Solution(estimate, information, r, converged)
+
+
+def _cost(r: Array, pr: Array, robust: bool) -> float:
+    data = (STUDENT + 1.0) * np.log1p(np.square(r) / STUDENT) if robust else np.square(r)
+    return float(np.sum(data) + np.sum(np.square(pr)))

@@ -1,0 +1,144 @@
+"""The published method: outlines to ellipses, ellipses to pairs of apexes, pairs to one position.
+
+Zhou, Hennerkes et al., Robotica 2023. The needle's direction is the published one: that of the line from the RCM to
+the estimated tip, whatever way the cones point. Their rotation errors are those of this line.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+
+from conespot.localize.image import AnyImage, grey8
+from conespot.localize.outcome import (
+    NEAR_CIRCLE,
+    NO_ELLIPSE,
+    NO_INTERSECTION,
+    Localization,
+    LocalizationFailure,
+    Outcome,
+)
+from conespot.localize.published.authors_code import coded_candidates
+from conespot.localize.published.cone_geometry import Array, Candidates, cone_over_ellipse, fitted_plane, retina_points
+from conespot.localize.published.detection import Contour, Mask, coded_mask, otsu_mask, outlines
+from conespot.localize.published.ellipse import fit_ellipse
+from conespot.scene import Pose, Scene
+from conespot.scene.pose import rot_x, rot_y
+
+#: a - b of the ellipse [px] below which one spotlight does not tell where its cone leans; an outline of whole pixels
+#: places a - b to about that, and at 9 deg it is worth 0.15 mm sideways
+_ROUND_PX = 0.1
+
+
+def paper(image: AnyImage, scene: Scene, oracle: Pose | None = None) -> Outcome:
+    """The paper's text: Otsu, Eqs. 1-7, the ellipse in the plane of the outline, Eqs. 22-24.
+
+    One spotlight: the candidate whose cone comes from the RCM. Several: of all combinations of candidates the one of
+    smallest spread, and of its positions the median of every coordinate (3.5).
+    """
+    return _localize(image, scene, otsu_mask, text_candidates, np.median, None)
+
+
+def paper_code(image: AnyImage, scene: Scene, oracle: Pose | None = None) -> Outcome:
+    """The authors' code, with the RCM (one spotlight) or the smallest spread (several) instead of the truth.
+
+    Of several positions the code takes the one nearest their mean.
+    """
+    return _localize(image, scene, coded_mask, _integer_candidates, _nearest_mean, None)
+
+
+def paper_code_float(image: AnyImage, scene: Scene, oracle: Pose | None = None) -> Outcome:
+    """`paper_code` without its cutting of the outline to whole pixels, to see what that costs."""
+    return _localize(image, scene, coded_mask, _float_candidates, _nearest_mean, None)
+
+
+def paper_code_oracle(image: AnyImage, scene: Scene, oracle: Pose | None = None) -> Outcome:
+    """The authors' code with their answer to the ambiguity: of each pair the candidate nearest the true tip."""
+    return _localize(image, scene, coded_mask, _integer_candidates, _nearest_mean, oracle)
+
+
+def text_candidates(outline: Contour, scene: Scene) -> Candidates | LocalizationFailure:
+    """Candidates for an outline `[N, 2]` of pixel indices, with the ellipse in the outline's own plane."""
+    points = retina_points(scene.camera, scene.eye, outline + 0.5)
+    if np.isnan(points).any():
+        return LocalizationFailure(NO_INTERSECTION)
+    plane = fitted_plane(points, scene.eye)
+    ellipse = fit_ellipse(plane.local(points))
+    if ellipse is None:
+        return LocalizationFailure(NO_ELLIPSE)
+    apexes, vertices = cone_over_ellipse(ellipse, scene.beam.half_angle)
+    return Candidates.of(plane.world(apexes), plane.world(vertices), ellipse.a - ellipse.b)
+
+
+def _integer_candidates(outline: Contour, scene: Scene) -> Candidates | LocalizationFailure:
+    return coded_candidates(outline, scene, whole_pixels=True)
+
+
+def _float_candidates(outline: Contour, scene: Scene) -> Candidates | LocalizationFailure:
+    return coded_candidates(outline, scene, whole_pixels=False)
+
+
+def _localize(
+    image: AnyImage,
+    scene: Scene,
+    segment: Callable[[np.ndarray], Mask],
+    reconstruct: Callable[[Contour, Scene], Candidates | LocalizationFailure],
+    unite: Callable[..., Array],
+    oracle: Pose | None,
+) -> Outcome:
+    patches = outlines(segment(grey8(image, scene)), len(scene.spotlights))
+    if isinstance(patches, LocalizationFailure):
+        return patches
+    pairs: list[Candidates] = []
+    for patch in patches:
+        pair = reconstruct(patch, scene)
+        if isinstance(pair, LocalizationFailure):
+            return pair
+        pairs.append(pair)
+    if oracle is not None:
+        positions = np.stack([_nearest(pair.apexes, oracle.apex) for pair in pairs])
+    elif len(pairs) == 1:
+        if pairs[0].flattening < _ROUND_PX * scene.camera.pixel_pitch:
+            return LocalizationFailure(NEAR_CIRCLE)
+        positions = from_rcm(pairs[0], scene)[None, :]
+    else:
+        positions = least_spread(np.stack([pair.apexes for pair in pairs]))
+    apex = unite(positions, axis=0)
+    spread = float(np.sqrt(np.mean(np.sum((positions - positions.mean(axis=0)) ** 2, axis=-1))))
+    axis = Pose.through(apex, scene.instrument.rcm).axis
+    return Localization(apex, axis, spread_mm=spread if len(pairs) > 1 else None)
+
+
+def from_rcm(pair: Candidates, scene: Scene) -> Array:
+    """Of one spotlight's two candidates the apex `[3]` [mm] that fits the known insertion point.
+
+    The cone leans against the line from the RCM to its apex by a known angle, zero unless the spotlight is offset.
+    """
+    spotlight = scene.spotlights[0]
+    down = np.array([0.0, 0.0, -1.0])
+    known = _angle(rot_y(spotlight.y) @ rot_x(spotlight.x) @ down, down)
+    needle = pair.apexes - np.asarray(scene.instrument.rcm)
+    return np.asarray(pair.apexes[np.argmin(np.abs(_angle(pair.axes, needle) - known))])
+
+
+def least_spread(apexes: Array) -> Array:
+    """Of all 2^K combinations of the candidates `[K, 2, 3]` the positions `[K, 3]` of least squared spread (3.5)."""
+    count = len(apexes)
+    picks = np.arange(2**count)[:, None] >> np.arange(count) & 1
+    positions = apexes[np.arange(count), picks]
+    spread = np.sum((positions - positions.mean(axis=1, keepdims=True)) ** 2, axis=(1, 2))
+    return np.asarray(positions[np.argmin(spread)])
+
+
+def _nearest(positions: Array, to: Array) -> Array:
+    return np.asarray(positions[np.argmin(np.linalg.norm(positions - to, axis=-1))])
+
+
+def _nearest_mean(positions: Array, axis: int) -> Array:
+    return _nearest(positions, positions.mean(axis=axis))
+
+
+def _angle(a: Array, b: Array) -> Array:
+    cross = np.linalg.norm(np.cross(a, b), axis=-1)
+    return np.arctan2(cross, np.sum(a * b, axis=-1))

@@ -1,0 +1,148 @@
+"""Round bright regions: rings of inward gradients of the logarithm of the light, of every size a cone can have.
+
+No threshold: what the retina reflects multiplies ambient light and spotlights alike, so the rim of a patch is the same
+step of the logarithm on a dark and on a bright ground. Every gradient has about the same vote, whatever its height, as
+in Hough's transform (D. H. Ballard, Generalizing the Hough transform, Pattern Recognition 13 (1981)).
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import lru_cache
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+from scipy import fft
+
+from conespot.localize.model.noise import linear_light
+from conespot.localize.model.solve import spread
+from conespot.scene.scene import Scene
+
+Array = NDArray[np.float64]
+Plane = NDArray[np.float32]
+_OVERVIEW_PX = 500  # about this many pixels a side are looked at
+_SHRINK, _FINE = 4, 2  # overview pixels a side of a bin of the vote
+_FINE_BINS = 8.0  # largest radius that needs fine bins
+_BLUR_BINS = 0.7
+_FULL_VOTE = 0.12  # gradient of the log light a bin that has half a vote
+_RATIO = 1.2  # of neighbouring radii
+_HIDDEN_BINS = 3
+
+
+@dataclass(frozen=True)
+class Overview:
+    """Every `step`-th pixel of a frame, in one channel, as light; and the same of a reference frame."""
+
+    light: Plane  #: `[h, w]` [white]
+    reference: Plane | None  #: `[h, w]` [white]
+    step: int
+    floor: float  #: added before the logarithm, so that noise in the dark and dark vessels count little [white]
+
+    @classmethod
+    def of(cls, image: NDArray[np.generic], scene: Scene, reference: NDArray[np.generic] | None) -> Overview:
+        """The overview of an image `[H, W]` or `[H, W, 3]`."""
+        step = max(1, image.shape[0] // _OVERVIEW_PX)
+        cut = (slice(step // 2, None, step),) * 2
+        light = _one_channel(image[cut], scene)
+        noise = spread(np.diff(light[::3, ::2], axis=1)) / math.sqrt(2.0)
+        floor = max(0.5 * float(np.median(light[::3, ::3])), 4.0 * noise, 1e-5)
+        return cls(light, None if reference is None else _one_channel(reference[cut], scene), step, floor)
+
+    def logarithm(self, light: Plane, reference: Plane | None) -> Plane:
+        """The logarithm of light, over that of the reference if there is one; any shape."""
+        result = np.log(np.maximum(light, 0.0) + np.float32(self.floor))
+        if reference is not None:
+            result -= np.log(np.maximum(reference, 0.0) + np.float32(self.floor))
+        return np.asarray(result, np.float32)
+
+
+@dataclass(frozen=True)
+class Ring:
+    """A round region brighter than what surrounds it."""
+
+    centre: Array  #: `[2]` [px]
+    radius: float  #: [px]
+    votes: float  #: mean vote along the ring, at most 1
+
+    def curve(self, points: int = 36) -> Array:
+        """Points `[points, 2]` [px] of the ring."""
+        angle = np.arange(points) * (2.0 * math.pi / points)
+        return np.asarray(self.centre + self.radius * np.stack([np.cos(angle), np.sin(angle)], axis=1))
+
+
+def find_rings(
+    overview: Overview, scene: Scene, most: int, hidden: Sequence[Array] = (), *, small: bool = False
+) -> list[Ring]:
+    """The `most` rings with the most votes, best first; gradients along `hidden` curves `[N, 2]` [px] do not vote.
+
+    `small` rings need finer bins, which take longer.
+    """
+    shrink = _FINE if small else _SHRINK
+    n = overview.light.shape[0] // shrink
+    planes = [
+        None if plane is None else np.asarray(cv2.resize(plane, (n, n), interpolation=cv2.INTER_AREA), np.float32)
+        for plane in (overview.light, overview.reference)
+    ]
+    assert planes[0] is not None
+    log = np.asarray(cv2.GaussianBlur(overview.logarithm(planes[0], planes[1]), (0, 0), _BLUR_BINS), np.float32)
+    gx, gy = (cv2.Scharr(log, cv2.CV_32F, dx, 1 - dx, scale=1.0 / 32.0) for dx in (1, 0))
+    vote = 1.0 / (np.sqrt(gx * gx + gy * gy) + np.float32(_FULL_VOTE))
+    scale = overview.step * shrink
+    for curve in hidden:
+        points = np.round(curve / scale - 0.5).astype(np.int32)
+        vote = np.asarray(cv2.polylines(vote, [points], True, 0.0, _HIDDEN_BINS), np.float32)
+    reach = math.tan(scene.beam.half_angle) / (scene.camera.pixel_pitch * scale)  # bins of radius a mm of distance
+    low, high = max(1.2, 0.7 * reach), max(2.4, reach * scene.eye.radius)
+    high = max(2.0 * low, _FINE_BINS) if small else high
+    radii = tuple(np.geomspace(low, high, max(3, round(math.log(high / low, _RATIO)) + 1)).tolist())
+    size = int(fft.next_fast_len(n + math.ceil(high) + 2, real=True))
+    field = fft.rfft2(np.stack([gx * vote, gy * vote]), s=(size, size))
+    kernels = _kernels(size, radii)
+    votes = fft.irfft2(field[0] * kernels[:, 0] + field[1] * kernels[:, 1], s=(size, size))[:, :n, :n]
+    y, x = np.ogrid[:n, :n]
+    found = []
+    for _ in range(most):
+        k, row, column = np.unravel_index(int(np.argmax(votes)), votes.shape)
+        best = float(votes[k, row, column])
+        grow, down, right = (_summit(votes, (int(k), int(row), int(column)), axis) for axis in range(3))
+        centre = scale * (np.array([column + right, row + down]) + 0.5)
+        found.append(Ring(centre, scale * radii[k] * (radii[1] / radii[0]) ** grow, best))
+        away = (x - column) ** 2 + (y - row) ** 2
+        for j, radius in enumerate(radii):
+            if 0.5 < radius / radii[k] < 2.0:
+                votes[j][away < (0.5 * max(radius, radii[k])) ** 2] = -1.0
+    return found
+
+
+def _summit(votes: NDArray[np.float32], peak: tuple[int, int, int], axis: int) -> float:
+    """How far beside its sample the peak of the votes is along an axis: the top of a parabola, at most half a step."""
+    at = peak[axis]
+    if not 0 < at < votes.shape[axis] - 1:
+        return 0.0
+    before, here, after = (float(votes[(*peak[:axis], at + j, *peak[axis + 1 :])]) for j in (-1, 0, 1))
+    bend = before - 2.0 * here + after
+    return 0.5 * (before - after) / bend if bend < 0.0 and min(before, after) >= 0.0 else 0.0
+
+
+@lru_cache(maxsize=4)
+def _kernels(size: int, radii: tuple[float, ...]) -> NDArray[np.complex64]:
+    """Transforms `[R, 2, size, size / 2 + 1]` of inward unit vectors along rings, conjugate: products correlate."""
+    y = np.arange(size)
+    y = np.where(y > size // 2, y - size, y).astype(float)
+    distance = np.maximum(np.hypot(y[:, None], y), 1e-6)
+    result = []
+    for radius in radii:
+        weight = np.exp(-0.5 * ((distance - radius) / max(0.6, 0.08 * radius)) ** 2)
+        weight[0, 0] = 0.0
+        weight /= weight.sum() * distance
+        result.append([np.conj(fft.rfft2(-y[None, :] * weight)), np.conj(fft.rfft2(-y[:, None] * weight))])
+    return np.array(result, np.complex64)
+
+
+def _one_channel(pixels: NDArray[np.generic], scene: Scene) -> Plane:
+    """Light in the image's brightest channel, pixel by pixel."""
+    light = linear_light(np.ascontiguousarray(pixels), scene)[0]
+    return np.ascontiguousarray(light if light.ndim == 2 else light.max(axis=2), np.float32)

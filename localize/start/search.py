@@ -1,0 +1,247 @@
+"""A robust start: round regions of light, each explained by the cones through the RCM, in the order of how well.
+
+What the retina reflects multiplies all light, so its vessels and its disc are steps of the log light whatever falls on
+them. Gradients of the log light of natural images follow Laplace's distribution (J. Huang, D. Mumford, Statistics of
+natural images and models, CVPR 1999), which makes the sum of their absolute values the log-likelihood of an albedo:
+the right cones are those without whose light this sum is least.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from conespot.localize.model.forward import moved, tangents
+from conespot.localize.model.outline import distances
+from conespot.localize.model.prior import Estimate
+from conespot.localize.model.solve import spread
+from conespot.localize.outcome import Localization, LocalizationFailure, Outcome
+from conespot.localize.start.rays import rays_across, support
+from conespot.localize.start.rig import poses_on
+from conespot.localize.start.rings import Overview, Ring, find_rings
+from conespot.scene.pose import Pose
+from conespot.scene.scene import Scene
+
+Array = NDArray[np.float64]
+NOTHING = "no spotlight stands out from its surroundings"
+ELSEWHERE = "the light is not where the fit puts the patch"
+TWO_PLACES = "two places in the frame look like the patch"
+_NEAR = 0.1  # of a patch's radius within which a fit stays near its start; starts are good to a third of it
+_SAME, _SOLID = 0.3, 0.5  # of it, and share explained, with which a ring is not followed once more
+_RINGS = 6
+_TURNS = 4  # steps from a ring's pose to that of the outline the rays see
+_FEWEST_RAYS = 8
+_DARK = 0.05  # share explained of one spotlight's outline below which it is not there
+_STILL_MM = 0.01
+_LEAST_WORTH = 0.2  # share of a ray's gradients that says where the outline is
+#: share of the gradients that a patch explains where nothing else is bright; a disc may explain nearly as much
+CONVINCING = 0.6
+#: what crosses a rim hides it on some rays only: a quarter of them must see more of the beam's edge than of all else
+_CLEAR = 0.52
+#: log light that all rays together must see in the mean, and the share of it: the retina's own mottle stays below
+_FAINTEST, _LEAST = 0.3, 0.25
+#: share of the best pose's evidence with which another one may be right: after a convincing one, and otherwise
+#: where the two touch, so that each hides part of the other's outline, or lie apart
+_AS_GOOD, _TOUCHING, _APART = 0.8, 0.25, 0.5
+_FITTED = 3
+_RIVAL = 0.85  # share of the best ring's votes with which another may be the patch
+_APART_MM = 0.1  # between poses that count as two
+
+
+@dataclass(frozen=True)
+class Start:
+    """A first pose through the RCM."""
+
+    pose: Pose
+    explained: float  #: share of the log light's gradients across the outlines that the cones explain, 0 to 1
+    clearest: float  #: share that a quarter of the rays across the outlines exceed
+    evidence: float  #: their sum along a ray, what it adds to the log-likelihood
+
+    @property
+    def stands_out(self) -> bool:
+        """Whether it may be a spotlight's light at all."""
+        return self.clearest > _CLEAR and self.explained > _LEAST and self.evidence > _FAINTEST
+
+    def near(self, pose: Pose, scene: Scene, share: float) -> bool:
+        """Whether the outlines of `pose` are within a `share` of their radius of where the start found them."""
+        return all(
+            float(np.linalg.norm(mine[0] - other[0])) + abs(mine[1] - other[1]) < share * mine[1]
+            for mine, other in zip(_circles(self.pose, scene), _circles(pose, scene), strict=True)
+        )
+
+    def touches(self, other: Start, scene: Scene) -> bool:
+        """Whether a patch of this start touches one of another's."""
+        return any(
+            float(np.linalg.norm(mine[0] - its[0])) < mine[1] + its[1]
+            for mine in _circles(self.pose, scene)
+            for its in _circles(other.pose, scene)
+        )
+
+
+def _circles(pose: Pose, scene: Scene) -> list[tuple[Array, float]]:
+    """Middle `[2]` and mean radius of each outline [px]."""
+    outlines = (scene.camera.project(scene.outline(pose, k, 24)) for k in range(len(scene.spotlights)))
+    middles = ((outline, outline.mean(axis=0)) for outline in outlines)
+    return [(middle, float(np.mean(np.linalg.norm(outline - middle, axis=1)))) for outline, middle in middles]
+
+
+def find_start(image: NDArray[np.generic], scene: Scene, reference: NDArray[np.generic] | None = None) -> Start | str:
+    """The best first pose from an image `[H, W]` or `[H, W, 3]`, or the reason why there is none."""
+    return next(find_starts(image, scene, reference), NOTHING)
+
+
+def find_starts(
+    image: NDArray[np.generic], scene: Scene, reference: NDArray[np.generic] | None = None
+) -> Iterator[Start]:
+    """Distinct first poses from an image `[H, W]` or `[H, W, 3]`, the one that explains it best first."""
+    overview = Overview.of(image, scene, reference)
+    most = _RINGS if len(scene.spotlights) == 1 else _RINGS + 2 * len(scene.spotlights)
+    rings = find_rings(overview, scene, most)
+    first = [ring for ring in rings if _rivals(ring, rings[0])] if len(scene.spotlights) == 1 else rings
+    found = _settled(overview, scene, first, [])
+    if not found or found[0].explained <= CONVINCING:
+        # a patch that touches something brighter: what was found is taken out of the vote
+        hidden = [rings[0].curve(), *(_outlines(start.pose, scene) for start in found[:1])]
+        more = [ring for curve in hidden for ring in find_rings(overview, scene, most, [curve])]
+        more += find_rings(overview, scene, most, small=True)
+        found = _settled(overview, scene, [*rings, *more], found, thorough=True)
+    if found:
+        found = _merged([*found, *_turned(overview, scene, found[0])])
+    for start in found[:_FITTED]:
+        share = _AS_GOOD if found[0].explained > CONVINCING else _TOUCHING if start.touches(found[0], scene) else _APART
+        if start.evidence >= share * found[0].evidence and start.stands_out:
+            yield start
+
+
+def believed(starts: Iterable[Start], scene: Scene, localized: Callable[[Start], Outcome]) -> Outcome:
+    """The one outcome of the starts that is not refused; if all are, the first refusal."""
+    refusal: LocalizationFailure | None = None
+    found: Localization | None = None
+    for start in starts:
+        outcome = localized(start)
+        if isinstance(outcome, Localization):
+            pose = Pose(outcome.apex_mm, outcome.axis, outcome.roll or 0.0)
+            if start.near(pose, scene, _NEAR):
+                if found is not None and float(np.linalg.norm(found.apex_mm - outcome.apex_mm)) > _APART_MM:
+                    return LocalizationFailure(TWO_PLACES)
+                found = outcome if found is None else found
+                continue
+            outcome = LocalizationFailure(ELSEWHERE)
+        if found is None and refusal is None and start.explained > CONVINCING:
+            return outcome
+        refusal = outcome if refusal is None else refusal
+    if found is not None:
+        return found
+    return LocalizationFailure(NOTHING) if refusal is None else refusal
+
+
+def _rivals(ring: Ring, best: Ring) -> bool:
+    apart = float(np.linalg.norm(ring.centre - best.centre))
+    return ring is best or (ring.votes > _RIVAL * best.votes and apart > 0.7 * max(ring.radius, best.radius))
+
+
+def _outlines(pose: Pose, scene: Scene) -> Array:
+    return np.concatenate([scene.camera.project(scene.outline(pose, k, 96)) for k in range(len(scene.spotlights))])
+
+
+def _settled(
+    overview: Overview, scene: Scene, rings: Sequence[Ring], before: Sequence[Start], *, thorough: bool = False
+) -> list[Start]:
+    """The poses that rings lead to, and those found before, without repetition, the best first."""
+    found = list(before)
+    for pose in poses_on(rings, scene):
+        # another ring on the outline of a start that is all but convincing leads there again
+        if any(start.explained > _SOLID and start.near(pose, scene, _SAME) for start in found):
+            continue
+        start = _settle(overview, scene, pose, thorough=thorough)
+        if start is not None:
+            found.append(start)
+    return _merged(found)
+
+
+def _turned(overview: Overview, scene: Scene, best: Start) -> Iterator[Start]:
+    """The starts with each spotlight in the next one's place, and so on: a rig may nearly repeat when it turns.
+
+    Turned by half as much, all patches but one may still fall on one another.
+    """
+    parts = len(scene.spotlights) * (1 if best.explained > CONVINCING else 2)
+    for k in range(1, parts if len(scene.spotlights) > 1 else 1):
+        pose = Pose(best.pose.apex, best.pose.axis, best.pose.roll + 2.0 * math.pi * k / parts)
+        start = _settle(overview, scene, pose, thorough=False)
+        if start is not None:
+            yield start
+
+
+def _merged(found: Sequence[Start]) -> list[Start]:
+    """The starts without repetition, the best first."""
+    distinct: list[Start] = []
+    for start in sorted(found, key=lambda s: -s.evidence):
+        if all(_differ(start.pose, other.pose) for other in distinct):
+            distinct.append(start)
+    return distinct
+
+
+def _differ(a: Pose, b: Pose) -> bool:
+    turned = abs(math.remainder(a.roll - b.roll, 2.0 * math.pi))
+    return float(np.linalg.norm(a.apex - b.apex)) > _APART_MM or turned > 0.2
+
+
+def _settle(overview: Overview, scene: Scene, pose: Pose, *, thorough: bool) -> Start | None:
+    """The pose near `pose` whose outlines the rays see; None where there is none."""
+    estimate = Estimate(pose, scene)
+    for turn in range(_TURNS + 1):
+        seen = rays_across(overview, scene, estimate.pose, thorough=thorough)
+        if not seen:
+            return None
+        points, worth = (np.concatenate(parts) for parts in zip(*(rays.found() for rays in seen), strict=True))
+        # a spotlight of which the frame shows nothing where it should be denies the whole pose
+        lit = min(support([rays])[0] for rays in seen) > _DARK
+        here = Start(estimate.pose, *support(seen)) if lit else None
+        if turn == _TURNS:
+            return here
+        spots = np.concatenate([np.full(len(r.total), r.spotlight, np.intp) for r in seen])
+        sizes = np.concatenate([np.linalg.norm(r.ends - r.middle, axis=1) for r in seen])
+        keep = worth > _LEAST_WORTH
+        moved_to = _towards(estimate, points[keep], spots[keep], worth[keep], sizes[keep])
+        if moved_to is None:
+            return None
+        shift = float(np.linalg.norm(moved_to.pose.apex - estimate.pose.apex))
+        if shift < _STILL_MM and abs(moved_to.pose.roll - estimate.pose.roll) < 1e-3:
+            return here
+        estimate = moved_to
+    return None
+
+
+def _towards(estimate: Estimate, pixels: Array, spots: NDArray[np.intp], worth: Array, sizes: Array) -> Estimate | None:
+    """One step of Gauss and Newton towards outlines through `pixels` `[N, 2]` [px], with the axis on the RCM."""
+    if len(pixels) < _FEWEST_RAYS:
+        return None
+    scene, pose = estimate.scene, estimate.pose
+    roll = len(scene.spotlights) > 1
+    r, jacobian, _ = distances(pixels, spots, estimate, roll=roll)
+    rcm = np.asarray(scene.instrument.rcm)
+    length = float(np.linalg.norm(pose.apex - rcm))
+    u, v = tangents(pose.axis)
+    tied = jacobian[:, :3] + (np.outer(jacobian[:, 3], u) + np.outer(jacobian[:, 4], v)) / length
+    if roll:
+        tied = np.column_stack([tied, jacobian[:, 5]])
+    scale = np.maximum(0.01 * sizes, spread(r))
+    weighted = tied * (worth / (4.0 + np.square(r / scale)) / scale**2)[:, None]
+    try:
+        step = -np.linalg.solve(weighted.T @ tied, weighted.T @ r)
+    except np.linalg.LinAlgError:
+        return None
+    reach = 0.4 * float(scene.eye.intersect(pose.apex, pose.axis))
+    step *= min(1.0, reach / max(1e-9, float(np.linalg.norm(step[:3]))))
+    tip = pose.apex + step[:3]
+    if not np.all(np.isfinite(step)) or scene.depth(tip) <= 0.0:
+        return None
+    through = Pose.through(tip, rcm)
+    if not roll:
+        return Estimate(through, scene)
+    turned = moved(pose, np.array([*step[:3], u @ step[:3] / length, v @ step[:3] / length, step[3]]))
+    return Estimate(Pose(tip, through.axis, turned.roll), scene)

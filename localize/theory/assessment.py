@@ -1,0 +1,191 @@
+"""What the theory says of a scene, as plain records: Table I, bounds, error budget and design guidance.
+
+Everything is asked for two tips: `LOW`, on the optical axis near the retina, and `HIGH`, aside and farther from it.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from conespot.localize.model.prior import Estimate, Knowns, prior_rows
+from conespot.localize.theory.bounds import Bound, Electrons, cramer_rao, error_budget, smoothed_over
+from conespot.localize.theory.conic import table_1
+from conespot.localize.theory.design import beam_of, compare_designs
+from conespot.scene.document import InputError
+from conespot.scene.emva import Emva
+from conespot.scene.pose import Pose
+from conespot.scene.scene import Scene
+from conespot.scene.surface import bump_grid
+
+Record = dict[str, str | float]
+
+LOW, HIGH = (0.0, 0.0, 3.0), (2.0, 0.0, 6.0)
+RESOLUTIONS = (5000, 1000)
+#: how well the bounds know the RCM [mm]
+_RCM: dict[str, float | None] = {"free": None, "0.05 mm": 0.05, "exact": 0.0}
+#: the ring of tips over which bumps are averaged: its radius, the helix's [mm], and how many
+_RING, _TURNS = 2.0, 90
+#: designs are compared at no more than this [px]: their ratios hardly depend on it, and the time does
+DESIGN_RESOLUTION = 1000
+_HALF_ANGLES = tuple(math.radians(a) for a in (5.0, 7.0, 9.0, 11.0, 13.0, 15.0))
+_SOFTNESS = (0.0, 0.1, 0.2, 0.3, 0.5, 0.7, 1.0)
+_COUNTS, _SPREADS = (1, 2, 3, 4, 6), tuple(math.radians(a) for a in (5.0, 8.0, 11.0, 14.0))
+
+
+@dataclass(frozen=True)
+class Assessment:
+    """Records `{column: value}` of the four tables; positions in um, angles in deg."""
+
+    table_1: list[Record]
+    bounds: list[Record]
+    budget: list[Record]
+    design: list[Record]
+    assumes: str  #: the pixel model and what else every number rests on
+
+
+def assess(scene: Scene) -> Assessment:
+    """All of it. Raises InputError for a scene in which the tips are outside the eye or their patches not seen."""
+    sensor = electrons_of(scene)
+    try:
+        return Assessment(
+            _table_1(),
+            _bounds(scene, sensor),
+            _budget(scene, sensor),
+            _design(scene, sensor),
+            _assumes(scene, sensor),
+        )
+    except ValueError as error:
+        raise InputError(f"scene: {error}; the theory is for tips at {_words(LOW)} and {_words(HIGH)}") from None
+
+
+def electrons_of(scene: Scene) -> Electrons:
+    """The sensor of the bounds: an EMVA camera metered as it says, else 9000 e- over 15 e-.
+
+    Without metering a camera's brightest light is taken to be 80 % of saturation.
+    """
+    if not isinstance(scene.sensor, Emva):
+        return Electrons()
+    camera = scene.sensor
+    level = camera.metering.level if camera.metering else 0.8
+    return Electrons(level * camera.saturation, math.sqrt(camera.read_noise**2 + 1.0 / (12.0 * camera.gain**2)))
+
+
+def tied(free: Bound, scene: Scene, pose: Pose, rcm_sigma_mm: float | None) -> Bound:
+    """The bound once the RCM is known so well: its information adds to that of the image, nuisances taken out."""
+    _, prior = prior_rows(Estimate(pose, scene), scene, Knowns(rcm_sigma_mm=rcm_sigma_mm), len(free.covariance))
+    return Bound(np.asarray(np.linalg.inv(np.linalg.inv(free.covariance) + prior.T @ prior), float))
+
+
+def _at(scene: Scene, *, resolution: int | None = None, softness: float | None = None) -> Scene:
+    camera = scene.camera.model_copy(update={"resolution": resolution or scene.camera.resolution})
+    beam = scene.beam if softness is None else beam_of(scene.beam.half_angle, softness)
+    return scene.model_copy(update={"camera": camera, "beam": beam})
+
+
+def _table_1() -> list[Record]:
+    return [
+        {
+            "half_angle_deg": row.half_angle_deg,
+            "in_plane_um": row.in_plane_um,
+            "distance_3d_um": row.distance_um,
+            "volume_distance_3d_um": row.volume_distance_um,
+        }
+        for row in table_1()
+    ]
+
+
+def _bounds(scene: Scene, sensor: Electrons) -> list[Record]:
+    found: list[Record] = []
+    for resolution in RESOLUTIONS:
+        for edge, softness in {"hard": 0.0, "soft": 1.0}.items():
+            changed = _at(scene, resolution=resolution, softness=softness)
+            for tip in (LOW, HIGH):
+                pose = changed.pose(np.array(tip))
+                free = cramer_rao(changed, pose, sensor)
+                for rcm, sigma in _RCM.items():
+                    bound = tied(free, changed, pose, sigma)
+                    values = {"position_um": 1e3 * bound.position_mm, "axis_deg": math.degrees(bound.axis_rad)}
+                    found.append({"resolution_px": resolution, "edge": edge, "height_mm": tip[2], "rcm": rcm, **values})
+    return found
+
+
+def _budget(scene: Scene, sensor: Electrons) -> list[Record]:
+    found: list[Record] = []
+    for tip in (LOW, HIGH):
+        pose = scene.pose(np.array(tip))
+        sides = (scene.camera.resolution, scene.camera.resolution // 2)
+        free = [cramer_rao(_at(scene, resolution=side), pose, sensor) for side in sides]
+        for rcm in ("free", "exact"):
+            moves = [
+                (part.quantity, *_in_degrees(part.quantity, part.tolerance), part.position_mm, part.axis_rad)
+                for part in error_budget(scene, pose, rcm=rcm == "exact")
+            ]
+            here, coarse = (tied(bound, scene, pose, _RCM[rcm]) for bound in free)
+            pixel = 1e3 * scene.camera.sensor_width / scene.camera.resolution
+            wider = (coarse.position_mm - here.position_mm, coarse.axis_rad - here.axis_rad)
+            moves += [
+                ("noise", 1.0, "x the sensor's", here.position_mm, here.axis_rad),
+                ("pixel_size", pixel, "um", *wider),
+                ("unknown_bumps", 0.1, "mm", *_bumps(scene, tip[2], rcm=rcm == "exact")),
+            ]
+            for name, tolerance, unit, position, axis in moves:
+                um, deg = 1e3 * position, math.degrees(axis)
+                row: Record = {"quantity": name, "tolerance": tolerance, "unit": unit, "position_um": um}
+                per = {"position_um_per_unit": um / tolerance, "axis_deg_per_unit": deg / tolerance}
+                found.append({"height_mm": tip[2], "rcm": rcm, **row, "axis_deg": deg, **per})
+    return found
+
+
+def _in_degrees(quantity: str, tolerance: float) -> tuple[float, str]:
+    return (math.degrees(tolerance), "deg") if quantity == "half_angle" else (tolerance, "mm")
+
+
+def _bumps(scene: Scene, height: float, *, rcm: bool) -> tuple[float, float]:
+    """What the paper's bumps do to a fit that does not know them, root mean square over a ring of tips [mm, rad]."""
+    bumpy = scene.model_copy(update={"surface": bump_grid()})
+    turns = 2.0 * math.pi * np.arange(_TURNS) / _TURNS
+    tips = [np.array([_RING * math.cos(t), _RING * math.sin(t), height]) for t in turns]
+    steps = np.array([smoothed_over(bumpy, scene.pose(tip), rcm=rcm) for tip in tips])
+    return float(np.sqrt(np.mean(steps[:, :3] ** 2) * 3.0)), float(np.sqrt(np.mean(steps[:, 3:5] ** 2) * 2.0))
+
+
+def _design(scene: Scene, sensor: Electrons) -> list[Record]:
+    coarse = _at(scene, resolution=min(scene.camera.resolution, DESIGN_RESOLUTION))
+    rigs = [(n, spread) for n in _COUNTS for spread in (_SPREADS if n > 1 else (0.0,))]
+    varied: dict[str, dict[str, Any]] = {
+        "half angle": {"half_angles": _HALF_ANGLES},
+        "edge softness": {"softness": _SOFTNESS},
+        "spotlights": {"rigs": rigs},
+    }
+    found: list[Record] = []
+    for what, values in varied.items():
+        for rcm in ("free", "exact"):
+            known = Knowns(rcm_sigma_mm=_RCM[rcm])
+            for design in compare_designs(coarse, (LOW, HIGH), sensor=sensor, knowns=known, **values):
+                row: Record = {"half_angle_deg": math.degrees(design.half_angle), "softness": design.softness}
+                row |= {"spotlights": design.spotlights, "spread_deg": math.degrees(design.spread)}
+                errors = {"position_um": 1e3 * design.position_mm, "axis_deg": math.degrees(design.axis_rad)}
+                found.append({"varied": what, "rcm": rcm, **row, **errors})
+    return found
+
+
+def _assumes(scene: Scene, sensor: Electrons) -> str:
+    """What the numbers rest on, for people."""
+    camera, peak, background = scene.camera, f"{sensor.peak:.0f}", f"{sensor.background:.3g}"
+    return (
+        "Square pixels that average exactly, no other blur; Gaussian noise of variance signal +"
+        f" ({background} e-)^2, independent between pixels; {peak} e- where the patch is brightest; albedo uniform or"
+        " known, gain and offset unknown. The budget is of an outline fit that weighs all points alike; bumps are those"
+        f" of the paper, averaged over tips {_RING:g} mm aside. Designs have the same {peak} e- each, at"
+        f" {min(camera.resolution, DESIGN_RESOLUTION)} px; a beam other than `cycles` counts as hard there. Eye of"
+        f" {scene.eye.radius:g} mm, camera {camera.height:g} mm above the pole, half angle"
+        f" {math.degrees(scene.beam.half_angle):g} deg, tips at {_words(LOW)} and {_words(HIGH)}."
+    )
+
+
+def _words(tip: tuple[float, float, float]) -> str:
+    return f"({', '.join(f'{c:g}' for c in tip)}) mm"
