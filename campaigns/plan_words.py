@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from conespot.campaigns.plan import Case, Group, Plan
-from conespot.render.rim import edge_pixels
+from conespot.render.rim import rim_pixels
 from conespot.scene import Pose
 from conespot.scene.exposure_limits import RetinalExposure, scene_exposure
 
@@ -96,7 +96,7 @@ def _tile_rays(group: Group, pose: Pose, spotlight: int) -> float:
     inside = np.clip(edge, 0.0, scene.camera.resolution)
     rays = float(np.prod(np.ptp(inside, axis=0))) * group.samples
     if group.edge_samples > group.samples:
-        rays += len(edge_pixels(scene, pose, spotlight)) * group.edge_samples
+        rays += len(rim_pixels(scene, pose, spotlight)) * group.edge_samples
     return rays
 
 

@@ -18,7 +18,7 @@ FINE = 0.005
 
 
 @dataclass(frozen=True)
-class Pattern:
+class Anatomy:
     """What tells one eye from another: relative changes of the layers, vessels and disc."""
 
     disc_centre: tuple[float, float]  #: arc coordinates [mm]
@@ -30,7 +30,7 @@ class Pattern:
     vein: Map  #: [um], fine
 
 
-def grid(texel: float) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+def texel_centres(texel: float) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Arc coordinates x and y [mm] of the texel centres of a map."""
     n = round(2.0 * EXTENT / texel)
     ticks = (np.arange(n) + 0.5) * texel - EXTENT

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from conespot.render import fundus_photo, fundus_tree
-from conespot.render.fundus_anatomy import COARSE, EXTENT, FINE, Map, grid
+from conespot.render.fundus_anatomy import COARSE, EXTENT, FINE, Map, texel_centres
 from conespot.scene import fundus
 from conespot.scene.retina import Fundus
 from conespot.scene.spectrum import Curve
@@ -76,15 +76,15 @@ def fundus_maps(retina: Fundus) -> FundusMaps:
     """The maps of a fundus, from the photograph or from its seed."""
     melanin = fundus.MELANIN[retina.pigmentation]
     rng = np.random.default_rng([retina.seed, 0x_F0_9D_05])
-    pattern = fundus_photo.pattern() if retina.source == "photo" else fundus_tree.pattern(rng)
-    sites = _site_maps(pattern.disc_centre, melanin)
-    tree = (pattern.artery, pattern.vein) if retina.vessels else (np.zeros_like(pattern.artery),) * 2
+    anatomy = fundus_photo.photographed() if retina.source == "photo" else fundus_tree.grown(rng)
+    sites = _site_maps(anatomy.disc_centre, melanin)
+    tree = (anatomy.artery, anatomy.vein) if retina.vessels else (np.zeros_like(anatomy.artery),) * 2
     return FundusMaps(
-        melanin=np.maximum(sites["melanin"] * (1.0 + pattern.melanin), 0.02).astype(np.float32),
-        blood=np.maximum(sites["blood"] * (1.0 + pattern.blood), 5.0).astype(np.float32),
-        epithelium=(sites["epithelium"] * (1.0 + pattern.epithelium)).astype(np.float32),
+        melanin=np.maximum(sites["melanin"] * (1.0 + anatomy.melanin), 0.02).astype(np.float32),
+        blood=np.maximum(sites["blood"] * (1.0 + anatomy.blood), 5.0).astype(np.float32),
+        epithelium=(sites["epithelium"] * (1.0 + anatomy.epithelium)).astype(np.float32),
         macular=sites["macular"],
-        disc=pattern.disc,
+        disc=anatomy.disc,
         artery=tree[0],
         vein=tree[1],
         mosaic=retina.detail * _mosaic_tile(np.random.default_rng([retina.seed, 0x_303A1C])),
@@ -93,7 +93,7 @@ def fundus_maps(retina: Fundus) -> FundusMaps:
 
 def _site_maps(disc_centre: tuple[float, float], melanin: float) -> dict[str, Map]:
     """The closed form's parameters between its three measured sites: fovea in the middle, nasal beyond the disc."""
-    x, y = grid(COARSE)
+    x, y = texel_centres(COARSE)
     rho = np.hypot(x, y)
     foveal = np.exp(-((rho / 0.75) ** 2))
     towards_disc = np.array(disc_centre) / np.hypot(*disc_centre)

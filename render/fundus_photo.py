@@ -13,7 +13,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from conespot.render.fundus_anatomy import COARSE, FINE, Map, Pattern, grid
+from conespot.render.fundus_anatomy import COARSE, FINE, Anatomy, Map, texel_centres
 from conespot.scene import fundus
 
 #: side of a photograph's texel [mm], centre of its round field and of the fovea (x, y), and radius of the field [px]
@@ -32,7 +32,7 @@ def disc_centre() -> tuple[float, float]:
 
 
 @functools.cache
-def pattern() -> Pattern:
+def photographed() -> Anatomy:
     """The photograph's pattern, continued beyond its field by reflection."""
     linear = _linear_photo()
     density = -np.log10(np.maximum(linear, 1e-3))  # [H, W, 3], blue first
@@ -51,7 +51,7 @@ def pattern() -> Pattern:
     ))  # fmt: skip
     disc = _disc_mask()
     melanin, blood, epithelium = _pigment(green, red, np.maximum(wide, (disc > 0.02).astype(np.uint8)))
-    return Pattern(
+    return Anatomy(
         disc_centre=disc_centre(),
         melanin=_onto(melanin, COARSE),
         blood=_onto(blood, COARSE),
@@ -86,7 +86,7 @@ def _reflected(x: NDArray[np.float64], y: NDArray[np.float64]) -> tuple[NDArray[
 
 def _onto(photo: NDArray[np.float32], texel: float, *, fade: bool = False) -> Map:
     """A map in the photograph's pixels on the texels of a fundus map; `fade`: to 0 outside the field, not reflected."""
-    x, y = grid(texel)
+    x, y = texel_centres(texel)
     at = _reflected(_FOVEA[0] + x / TEXEL, _FOVEA[1] - y / TEXEL)
     blurred = cv2.GaussianBlur(photo, (0, 0), 0.4 * texel / TEXEL) if texel > TEXEL else photo
     how = cv2.INTER_LINEAR if texel > TEXEL else cv2.INTER_CUBIC

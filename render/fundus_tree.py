@@ -8,7 +8,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from conespot.render.fundus_anatomy import COARSE, EXTENT, FINE, Map, Pattern, grid, smooth_noise
+from conespot.render.fundus_anatomy import COARSE, EXTENT, FINE, Anatomy, Map, smooth_noise, texel_centres
 from conespot.scene import fundus
 
 Array = NDArray[np.float64]
@@ -30,20 +30,20 @@ class _Vessel:
     radii: Array
 
 
-def pattern(rng: np.random.Generator) -> Pattern:
+def grown(rng: np.random.Generator) -> Anatomy:
     """An eye of its own: left or right, disc size and place, arcades, branches and pigment all drawn from `rng`."""
     side = rng.choice([-1.0, 1.0])  # the disc is left of the fovea in a left eye
     disc = np.array([side * rng.uniform(4.2, 4.8), rng.uniform(0.1, 0.8)])
     semi_axes = rng.uniform(0.80, 0.95), rng.uniform(0.9, 1.08)
     trees = {kind: _tree(rng, disc, kind) for kind in ("artery", "vein")}
-    x, y = grid(COARSE)
+    x, y = texel_centres(COARSE)
     radius = np.hypot((x - disc[0]) / semi_axes[0], (y - disc[1]) / semi_axes[1])
     mask = 1.0 / (1.0 + np.exp((radius - 1.0) / 0.03))
     n = len(x)
     melanin = 0.08 * smooth_noise(rng, n, 3.0 / COARSE) + 0.04 * smooth_noise(rng, n, 0.4 / COARSE)
     blood = 0.10 * smooth_noise(rng, n, 1.5 / COARSE) + 0.10 * _choroidal_vessels(rng, n)
     epithelium = 0.05 * smooth_noise(rng, n, 2.0 / COARSE) + 0.03 * smooth_noise(rng, n, 0.15 / COARSE)
-    return Pattern(
+    return Anatomy(
         disc_centre=(float(disc[0]), float(disc[1])),
         melanin=np.clip(melanin, -0.3, 0.3).astype(np.float32),
         blood=np.clip(blood, -0.4, 0.4).astype(np.float32),

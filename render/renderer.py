@@ -9,8 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from conespot.render import emitters, kernel, shaft, spectral
-from conespot.render.rim import edge_pixels
-from conespot.render.stage import View
+from conespot.render.rim import rim_pixels
+from conespot.render.stage import Stage
 from conespot.render.tile import Crop, Tile
 from conespot.scene import Pose, Scene
 from conespot.scene.illumination import Light
@@ -49,7 +49,7 @@ class Renderer:
         self._shaft = scene.instrument.shaft
         self._responses = responses
         emitter = emitters.spotlight(self._mi, scene)
-        self._lit = self._view(emitter, scene.illumination, samples, self._shaft is not None)
+        self._lit = self._stage(emitter, scene.illumination, samples, self._shaft is not None)
 
     def tile(self, pose: Pose, spotlight: int, seed: int) -> Tile:
         """The radiance of one spotlight at 1 W; `seed` decides its Monte Carlo noise.
@@ -68,7 +68,7 @@ class Renderer:
         radiance = self._lit.render(crop, self.samples, seed)
         if self.edge_samples > self.samples and radiance.size:
             pixels = crop.pixels(n)
-            edge = np.isin(pixels, edge_pixels(self.scene, pose, spotlight))
+            edge = np.isin(pixels, rim_pixels(self.scene, pose, spotlight))
             radiance[edge.reshape(crop.height, crop.width)] = self._lit.pixels(pixels[edge], self.edge_samples, seed)
         return Tile(crop, radiance)
 
@@ -110,16 +110,16 @@ class Renderer:
         return SPECTRAL_BACKGROUND_SAMPLES if spectral_retina else BACKGROUND_SAMPLES
 
     @functools.lru_cache(maxsize=2)  # noqa: B019 - a renderer lives as long as its process
-    def _ambient(self, with_shaft: bool) -> View:
+    def _ambient(self, with_shaft: bool) -> Stage:
         samples = self.samples if with_shaft else self._background_samples
         emitter = emitters.ambient(self.scene)
-        return self._view(emitter, self.scene.ambient.illumination, samples, with_shaft, like=self._lit)
+        return self._stage(emitter, self.scene.ambient.illumination, samples, with_shaft, like=self._lit)
 
-    def _view(
-        self, emitter: dict[str, Any], light: Light, samples: int, with_shaft: bool, like: View | None = None
-    ) -> View:
-        """The spotlights' view, or one `like` it in ambient light, which sees no interreflection."""
-        return View(
+    def _stage(
+        self, emitter: dict[str, Any], light: Light, samples: int, with_shaft: bool, like: Stage | None = None
+    ) -> Stage:
+        """The spotlights' stage, or one `like` it in ambient light, which sees no interreflection."""
+        return Stage(
             self.scene,
             emitter,
             light,

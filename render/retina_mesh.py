@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 from conespot.render.reflectance import Reflectance
 from conespot.scene import Scene
 
-#: edge of the mesh [mm]: the chord then departs from the sphere by 10 nm, from the paper's bumps by up to 1.7 um
-EDGE = 0.03
+#: distance of neighbouring vertices [mm]: chords depart from the sphere by 10 nm, from the paper's bumps by up to 1.7 um
+VERTEX_SPACING = 0.03
 
 
 def arc_extent(scene: Scene) -> float:
@@ -42,7 +42,7 @@ def from_arc(scene: Scene, arc: NDArray[np.float64]) -> NDArray[np.float64]:
 def retina_mesh(mi: Any, scene: Scene, bsdf: Any) -> Any:
     """The Mitsuba mesh of the visible retina: on the surface, with its exact normals."""
     extent = arc_extent(scene)
-    n = math.ceil(2.0 * extent / EDGE) + 1
+    n = math.ceil(2.0 * extent / VERTEX_SPACING) + 1
     ticks = np.linspace(-extent, extent, n)
     arc = np.stack(np.meshgrid(ticks, ticks, indexing="xy"), axis=-1).reshape(-1, 2)
     directions = from_arc(scene, arc)

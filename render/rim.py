@@ -15,7 +15,7 @@ STEEP = 0.1
 _STEP = 0.25
 
 
-def edge_pixels(scene: Scene, pose: Pose, spotlight: int) -> NDArray[np.uint32]:
+def rim_pixels(scene: Scene, pose: Pose, spotlight: int) -> NDArray[np.uint32]:
     """The pixels `[N]` of the frame (row * resolution + column, ascending) within half a pixel of a steep beam.
 
     None where the beam is soft. Edges of shadows that bumps or the shaft cast are not among them.

@@ -1,4 +1,4 @@
-"""A view: the camera's picture of the retina in one light, as a Mitsuba scene that is loaded once and updated."""
+"""A stage: the camera's picture of the retina in one light, as a Mitsuba scene that is loaded once and updated."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ Image = NDArray[np.float32]
 PASS = 2**23
 
 
-class View:
+class Stage:
     """The retina in one light, seen by a film with the sensor's channels.
 
     The JIT variants evaluate a spectral map at every sampled wavelength. The scalar one cannot, so there each channel
@@ -40,9 +40,9 @@ class View:
         shapes: Mapping[str, Any],
         responses: dict[str, Curve] | None = None,
         closed: bool = False,
-        like: View | None = None,
+        like: Stage | None = None,
     ) -> None:
-        """Load it. `like` is another view of the same scene, whose retina is shared where the light plays no part."""
+        """Load it. `like` is another stage of the same scene, whose retina is shared where the light plays no part."""
         mi, dr, chosen = kernel.load()
         self._mi, self._vectorized = mi, chosen.vectorized
         self._resolution = scene.camera.resolution

@@ -10,7 +10,7 @@ from pydantic import Field, model_validator
 
 from conespot.scene.model import Model
 from conespot.scene.quantity import Length, Seconds, Wavelength
-from conespot.scene.spectrum import Curve, published
+from conespot.scene.spectrum import Curve, tabulated
 
 #: elementary charge [C], and h c / e [V nm]: a quantum efficiency times wavelength over it is a responsivity [A/W]
 ELEMENTARY_CHARGE = 1.602176634e-19
@@ -123,7 +123,7 @@ class Emva(Model):
         """Responsivity of each channel behind the filters [A/W]: quantum efficiency times wavelength e / (h c)."""
         found = {}
         for channel, columns in CHIPS[self.chip].items():
-            curves = [published("camera_qe_cmv12000", column) for column in columns]
+            curves = [tabulated("camera_qe_cmv12000", column) for column in columns]
             efficiency = np.mean([curve.values for curve in curves], axis=0)
             # lambda times a broken line is no broken line; a product on a fine grid is one to 1e-5
             wavelengths = Curve(np.array([300.0, 1100.0]), np.array([300.0, 1100.0]) / _VOLT_NM)

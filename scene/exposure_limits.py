@@ -14,7 +14,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from conespot.scene.pose import Pose
 from conespot.scene.scene import Scene
-from conespot.scene.spectrum import Curve, mean_of, published
+from conespot.scene.spectrum import Curve, mean_of, tabulated
 from conespot.scene.spotlights import spotlight_axes
 
 LABEL = "2007 edition, research estimate, not a safety assessment"
@@ -64,8 +64,8 @@ class RetinalExposure:
 
 def hazard_fractions(spectrum: Curve) -> tuple[float, float]:
     """A- and R-weighted power over power of a light. Wavelengths where a weight is not tabulated do not count."""
-    photochemical = published("iso15004_2_2007_weights", "A_aphakic").cut(305.0, 700.0)
-    return mean_of(spectrum, photochemical), mean_of(spectrum, published("iso15004_2_2007_weights", "R_thermal"))
+    photochemical = tabulated("iso15004_2_2007_weights", "A_aphakic").cut(305.0, 700.0)
+    return mean_of(spectrum, photochemical), mean_of(spectrum, tabulated("iso15004_2_2007_weights", "R_thermal"))
 
 
 def exposure(irradiance: float, spectrum: Curve) -> RetinalExposure:

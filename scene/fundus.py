@@ -16,7 +16,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from conespot.scene.spectrum import published
+from conespot.scene.spectrum import tabulated
 
 Array = NDArray[np.float64]
 
@@ -56,8 +56,8 @@ MELANIN = {"light": 0.3, "medium": 1.2, "dark": 2.1}
 
 def blood_absorption(wavelength: ArrayLike, saturation: float) -> Array:
     """Absorption of whole blood, 150 g/l haemoglobin [1/um], natural logarithm (Prahl's table)."""
-    oxygenated = published("hemoglobin_prahl", "eps_HbO2_per_cm_per_M")(wavelength)
-    reduced = published("hemoglobin_prahl", "eps_Hb_per_cm_per_M")(wavelength)
+    oxygenated = tabulated("hemoglobin_prahl", "eps_HbO2_per_cm_per_M")(wavelength)
+    reduced = tabulated("hemoglobin_prahl", "eps_Hb_per_cm_per_M")(wavelength)
     return np.asarray(2.303 * (saturation * oxygenated + (1.0 - saturation) * reduced) * 150.0 / 64500.0 * 1e-4)
 
 
@@ -68,7 +68,7 @@ def scatter(wavelength: ArrayLike) -> Array:
 
 def macular_template(wavelength: ArrayLike) -> Array:
     """Macular pigment density relative to 460 nm (Bone, Landrum & Cairns 1992)."""
-    return np.asarray(published("macular_pigment_bone", "optical_density")(wavelength) / 0.35)
+    return np.asarray(tabulated("macular_pigment_bone", "optical_density")(wavelength) / 0.35)
 
 
 def melanin_template(wavelength: ArrayLike) -> Array:
@@ -121,7 +121,7 @@ def lens_density(wavelength: ArrayLike, age: float = 28.0, density_420: float = 
 
 def water_transmission(wavelength: ArrayLike, length: float = VITREOUS_LENGTH) -> Array:
     """Transmission of `length` [mm] of vitreous, taken as water (Hale & Querry, Appl. Opt. 12:555, 1973)."""
-    per_cm = published("water_absorption", "hale_querry_per_cm")(wavelength)
+    per_cm = tabulated("water_absorption", "hale_querry_per_cm")(wavelength)
     return np.asarray(np.exp(-per_cm * length / 10.0))
 
 

@@ -15,7 +15,7 @@ from pydantic import BeforeValidator, Field, ValidationInfo, model_validator
 
 from conespot.scene.model import Model, unknown_name
 from conespot.scene.quantity import Angle, Irradiance, Wavelength
-from conespot.scene.spectrum import Curve, published, read_curve
+from conespot.scene.spectrum import Curve, read_curve, tabulated
 
 _Visible = Annotated[Wavelength, Field(ge=300.0, le=1100.0)]
 _Name = Annotated[str, Field(pattern=r"^[\w .+-]{1,40}$")]
@@ -67,7 +67,7 @@ class Lamp(Model):
     def spectrum(self) -> Curve:
         """Spectral density with integral 1 [1/nm]."""
         column, low, high = LAMPS[self.name]
-        return published("light_sources", column).cut(low, high).normalised()
+        return tabulated("light_sources", column).cut(low, high).normalised()
 
 
 class Line(Model):

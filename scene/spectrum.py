@@ -96,7 +96,7 @@ def mean_of(light: Curve, quantity: Curve) -> float:
 
 
 @functools.cache
-def published(table: str, column: str) -> Curve:
+def tabulated(table: str, column: str) -> Curve:
     """A column of a table in scene/data; its source stands in the file. Rows where the column is blank are left out."""
     text = resources.files("conespot.scene").joinpath(f"data/{table}.csv").read_text("utf-8")
     rows = csv.DictReader(line for line in text.splitlines() if not line.startswith("#"))

@@ -113,7 +113,7 @@ class Random(Volume):
         return self.at(rng.random((poses, 3)))
 
 
-class Table(Model):
+class Waypoints(Model):
     """Tip positions from the columns x_mm, y_mm, z_mm of a CSV file, in its order; the first N of them are used."""
 
     kind: Literal["csv"] = "csv"
@@ -152,7 +152,7 @@ def _read_points(path: Path) -> list[Point]:
 
 
 Trajectory = Annotated[
-    Box | Helix | Spiral | Line | Grid | Random | Table,
+    Box | Helix | Spiral | Line | Grid | Random | Waypoints,
     Field(discriminator="kind"),
 ]
 KINDS: dict[str, type[Model]] = {
@@ -162,7 +162,7 @@ KINDS: dict[str, type[Model]] = {
     "line": Line,
     "grid": Grid,
     "random": Random,
-    "csv": Table,
+    "csv": Waypoints,
 }
 
 

@@ -13,7 +13,7 @@ from conespot.render import Crop, Exposure, Renderer
 from conespot.render.exposure import encode
 from conespot.render.reflectance import EXTENT, TEXEL, Reflectance
 from conespot.render.retina_mesh import from_arc, to_arc
-from conespot.render.rim import edge_pixels
+from conespot.render.rim import rim_pixels
 from conespot.scene import Camera, Eye, Pose, Scene
 from conespot.scene.beam import CyclesBeam, HardBeam, LinearBeam, TabulatedBeam
 from conespot.scene.illumination import LIGHTS, Ambient
@@ -372,7 +372,7 @@ def test_a_beam_is_refined_where_it_is_steep_and_nowhere_else():
     per_pixel = 18.0 / np.ptp(scene_of().camera.project(scene_of().outline(pose, 0)), axis=0).min()
     for name, beam in {**BEAMS, "step inside": step}.items():
         scene = scene_of(beam=beam)
-        row, column = np.divmod(edge_pixels(scene, pose, 0).astype(int), 400)
+        row, column = np.divmod(rim_pixels(scene, pose, 0).astype(int), 400)
         rays = scene.camera.back_project(np.stack([column, row], axis=-1) + 0.5)
         to_point = scene.surface.intersect(scene.eye, scene.camera.centre, rays) - pose.apex
         angles[name] = np.degrees(np.arccos(to_point @ pose.axis / np.linalg.norm(to_point, axis=-1)))
@@ -386,7 +386,7 @@ def test_a_beam_is_refined_where_it_is_steep_and_nowhere_else():
 def test_a_pixel_is_the_same_whatever_else_is_rendered_and_in_however_many_passes(monkeypatch):
     """A crop against one pixel in three of it, and against passes of 1,000 samples: equal to the bit."""
     from conespot.render import kernel
-    from conespot.render import stage as view
+    from conespot.render import stage
 
     assert kernel.load()[2].vectorized
     renderer = Renderer(scene_of(retina=PhotoRetina()), samples=16)
@@ -396,7 +396,7 @@ def test_a_pixel_is_the_same_whatever_else_is_rendered_and_in_however_many_passe
     assert whole.max() > 0.0
     some = renderer._lit.pixels(crop.pixels(400)[::3], 16, seed=3)
     np.testing.assert_array_equal(some, whole.reshape(-1, 1)[::3])
-    monkeypatch.setattr(view, "PASS", 1000)
+    monkeypatch.setattr(stage, "PASS", 1000)
     np.testing.assert_array_equal(renderer._lit.render(crop, 16, seed=3), whole)
     assert not np.array_equal(renderer._lit.render(crop, 16, seed=4), whole)
 

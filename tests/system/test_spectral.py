@@ -23,7 +23,7 @@ from conespot.scene.illumination import LIGHTS, Ambient, FlatBand, Line
 from conespot.scene.power import Power
 from conespot.scene.retina import RETINAS, Fundus, FundusSite, Glint, UniformRetina
 from conespot.scene.sensor import SENSORS, Linear
-from conespot.scene.spectrum import Curve, published
+from conespot.scene.spectrum import Curve, tabulated
 
 DATA = Path(__file__).parents[1] / "data"
 #: stated values of the closed form at the perifovea [%]
@@ -60,8 +60,8 @@ def background_spectrum(retina, wavelengths, resolution=32) -> np.ndarray:
             ambient=Ambient(illumination=BROAD),
         )
         renderer = Renderer(scene, responses=narrow_channels(wavelengths))
-        view = renderer._ambient(with_shaft=False)
-        frames.append(view.render(Crop(0, 0, resolution, resolution), 256, 1).astype(float))
+        stage = renderer._ambient(with_shaft=False)
+        frames.append(stage.render(Crop(0, 0, resolution, resolution), 256, 1).astype(float))
     return frames[0] / frames[1]
 
 
@@ -128,7 +128,7 @@ def test_sensor_response_integrals(band):
         )
         signals.append(float(Renderer(scene).background().mean(dtype=float)))
     x = np.linspace(*band, 100_001)
-    responsivity = np.mean(published("camera_qe_cmv12000", "qe_nir")(x) * x) / 1239.84
+    responsivity = np.mean(tabulated("camera_qe_cmv12000", "qe_nir")(x) * x) / 1239.84
     assert signals[0] / signals[1] == pytest.approx(responsivity, rel=1e-3)
 
 
@@ -246,12 +246,12 @@ def test_float32_is_enough_for_the_geometry():
     """Where Mitsuba's float32 camera rays meet the mesh; against float64 closed form; below 0.1 um, 1/26 of a pixel."""
     mi, _, _ = kernel.load()
     scene = Scene(camera=Camera(resolution=5000), retina=UniformRetina())
-    view = Renderer(scene)._lit
+    stage = Renderer(scene)._lit
     pixels = np.random.default_rng(1).uniform(50.0, 4950.0, (4000, 2))
     rays = scene.camera.back_project(pixels)
     expected = scene.surface.intersect(scene.eye, np.broadcast_to(scene.camera.centre, rays.shape), rays)
     origin = mi.Point3f(*[float(c) for c in scene.camera.centre])
-    found = view._scenes[0].ray_intersect(mi.Ray3f(origin, mi.Vector3f(rays.T.astype(np.float32))))
+    found = stage._scenes[0].ray_intersect(mi.Ray3f(origin, mi.Vector3f(rays.T.astype(np.float32))))
     points = np.array(found.p).reshape(3, -1).T
     assert np.max(np.linalg.norm(points - expected, axis=1)) < 1e-4
 

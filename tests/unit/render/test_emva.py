@@ -14,7 +14,7 @@ from conespot.scene.emva import EMVA_PRESETS, BandPass, Emva, LongPass, Metering
 from conespot.scene.illumination import LIGHTS, FlatBand
 from conespot.scene.scene import read_scene
 from conespot.scene.sensor import SENSORS, sensor_name
-from conespot.scene.spectrum import published
+from conespot.scene.spectrum import tabulated
 
 
 def photon_transfer(sensor: Emva, electrons: np.ndarray, seed: int = 1) -> tuple[np.ndarray, np.ndarray]:
@@ -141,7 +141,7 @@ def test_response_integrals(band):
     sensor = Emva(chip="cmv12000-nir")
     signal = FlatBand(low=band[0], high=band[1]).spectrum.times(sensor.responses["mono"]).integral()
     x = np.linspace(*band, 100_001)
-    truth = np.mean(published("camera_qe_cmv12000", "qe_nir")(x) * x) / 1239.84
+    truth = np.mean(tabulated("camera_qe_cmv12000", "qe_nir")(x) * x) / 1239.84
     assert signal == pytest.approx(truth, rel=1e-3)
 
 

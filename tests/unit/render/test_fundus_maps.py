@@ -5,7 +5,7 @@ import functools
 import numpy as np
 import pytest
 
-from conespot.render.fundus_anatomy import COARSE, EXTENT, Map, grid
+from conespot.render.fundus_anatomy import COARSE, EXTENT, Map, texel_centres
 from conespot.render.fundus_maps import fundus_maps
 from conespot.scene import fundus
 from conespot.scene.illumination import LIGHTS
@@ -30,7 +30,7 @@ def vessel_mask(name: str, deep: float) -> Map:
 @pytest.mark.parametrize("wavelength", [550.0, 640.0, 850.0])
 def test_the_perifovea_reflects_like_the_closed_form(name, wavelength):
     """Median over the ring 2 to 3 mm from the fovea; against R of the perifovea without macular pigment; 10 %."""
-    x, y = grid(COARSE)
+    x, y = texel_centres(COARSE)
     rho = np.hypot(x, y)
     ring = (rho > 2.0) & (rho < 3.0)
     expected = float(fundus.reflectance(wavelength, fundus.SITES["perifovea"]))
@@ -40,7 +40,7 @@ def test_the_perifovea_reflects_like_the_closed_form(name, wavelength):
 @pytest.mark.parametrize("name", SOURCES)
 def test_the_fovea_is_dark_in_blue_and_the_disc_bright_everywhere(name):
     """Mean within 0.3 mm of the fovea at 460 nm; against the perifovea: half. Disc at 550 and 850 nm: twice."""
-    x, y = grid(COARSE)
+    x, y = texel_centres(COARSE)
     rho = np.hypot(x, y)
     ring = (rho > 2.0) & (rho < 3.0)
     blue = seen(name, 460.0)

@@ -7,7 +7,7 @@ from conespot.scene import InputError
 from conespot.scene.document import Document
 from conespot.scene.illumination import LIGHTS, Ambient, FlatBand, Line, MeasuredLight
 from conespot.scene.scene import Scene, read_scene
-from conespot.scene.spectrum import Curve, mean_of, published
+from conespot.scene.spectrum import Curve, mean_of, tabulated
 
 
 @pytest.mark.parametrize("name", LIGHTS)
@@ -33,9 +33,9 @@ def test_lights_sit_where_their_data_sheets_say(name, centroid):
 def test_band_integrals_match_a_fine_sum(band, table):
     """Integral of light times quantum efficiency over a band; against a sum on a 0.001 nm grid; within 0.1 %."""
     light = LIGHTS["halogen"].spectrum if table == "halogen" else FlatBand(low=400.0, high=1000.0).spectrum
-    efficiency = published("camera_qe_cmv12000", "qe_nir").cut(*band)
+    efficiency = tabulated("camera_qe_cmv12000", "qe_nir").cut(*band)
     x = np.linspace(*band, 100_001)
-    truth = np.trapezoid(light(x) * published("camera_qe_cmv12000", "qe_nir")(x), x)
+    truth = np.trapezoid(light(x) * tabulated("camera_qe_cmv12000", "qe_nir")(x), x)
     assert light.times(efficiency).integral() == pytest.approx(truth, rel=1e-3)
 
 
