@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from conespot.render.reflectance import Reflectance
 from conespot.scene import Scene
 
-#: distance of neighbouring vertices [mm]: chords depart from the sphere by 10 nm, from the paper's bumps by up to 1.7 um
+#: of neighbouring vertices [mm]: chords depart from the sphere by 10 nm, from the paper's bumps by up to 1.7 um
 VERTEX_SPACING = 0.03
 
 

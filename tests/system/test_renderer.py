@@ -385,8 +385,7 @@ def test_a_beam_is_refined_where_it_is_steep_and_nowhere_else():
 
 def test_a_pixel_is_the_same_whatever_else_is_rendered_and_in_however_many_passes(monkeypatch):
     """A crop against one pixel in three of it, and against passes of 1,000 samples: equal to the bit."""
-    from conespot.render import kernel
-    from conespot.render import stage
+    from conespot.render import kernel, stage
 
     assert kernel.load()[2].vectorized
     renderer = Renderer(scene_of(retina=PhotoRetina()), samples=16)
