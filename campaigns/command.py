@@ -214,10 +214,10 @@ def _compare(options: argparse.Namespace) -> Ending:
 
 
 def _write_results(folder: Path) -> None:
-    from conespot.results import summary, write_results
+    from conespot.results import tables_text, write_results
 
     write_results(folder)
-    _say(summary(folder))
+    _say(tables_text(folder))
     _say(f"{folder}: errors.csv, errors.parquet, boxes.csv, tables/, figures/; read report.html first")
 
 

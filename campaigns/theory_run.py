@@ -27,7 +27,7 @@ def described_scene(name: str, settings: Sequence[str]) -> Scene:
 def write_theory_of(name: str, settings: Sequence[str], out: str | None) -> tuple[Path, str]:
     """Assess a scene and write what is found: the folder, and the text of its tables. Raises InputError."""
     from conespot.localize.theory.assessment import assess
-    from conespot.results.theory_tables import write_theory
+    from conespot.results.theory_tables import write_theory_tables
 
     found = assess(described_scene(name, settings))
     folder = Path(out or Path("runs") / f"theory-{Path(name).stem}")
@@ -37,4 +37,4 @@ def write_theory_of(name: str, settings: Sequence[str], out: str | None) -> tupl
         reason = "is a file, not a folder" if folder.is_file() else f"cannot be written: {error.strerror}"
         raise InputError(f"{folder}: {reason}; choose another --out") from None
     tables = {"table_1": found.table_1, "bounds": found.bounds, "budget": found.budget, "design": found.design}
-    return folder, write_theory(folder, tables, name, found.assumes)
+    return folder, write_theory_tables(folder, tables, name, found.assumes)

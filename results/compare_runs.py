@@ -8,7 +8,7 @@ from typing import Any
 
 import pandas as pd
 
-from conespot.results.comparison import Comparison, compare
+from conespot.results.comparison import Comparison, compare_lights
 from conespot.results.comparison_figure import comparison_figure
 from conespot.results.light_exposure import light_exposures
 from conespot.results.run import load_run
@@ -36,7 +36,7 @@ def compare_runs(folders: Sequence[Path], a: str | None = None, b: str | None = 
         raise InputError(
             f"{source}: all frames are in one light, {a}; sweep over scene.illumination or give a second run"
         )
-    comparisons = [c for other in others for c in compare(rows, a, other, source)]
+    comparisons = [c for other in others for c in compare_lights(rows, a, other, source)]
     exposures = {name: e for run in runs for name, e in light_exposures(run).items() if name in (a, *others)}
     text = _text(comparisons, exposures)
     folder = folders[0]

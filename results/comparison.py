@@ -82,7 +82,7 @@ class Comparison:
         return f"{self.localizer}: {verdict}: {numbers}; {failures}{more}."
 
 
-def compare(rows: Sequence[Rows], a: str, b: str, source: str) -> list[Comparison]:
+def compare_lights(rows: Sequence[Rows], a: str, b: str, source: str) -> list[Comparison]:
     """Compare the lights `a` (reference) and `b`, pairing the rows of equal settings, powers and poses.
 
     Raises InputError, which names `source`, for a light that no row has, rows that do not pair and other poses.

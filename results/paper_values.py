@@ -39,7 +39,7 @@ NOTES = {
 
 
 @dataclass(frozen=True)
-class PublishedError:
+class PaperValue:
     """One published number: AE (mean) or ME (maximum) of `metric` [mm or deg, as the metric's name says]."""
 
     source: str
@@ -59,30 +59,30 @@ def _read(name: str) -> list[dict[str, str]]:
 
 
 @functools.cache
-def published_errors() -> tuple[PublishedError, ...]:
+def paper_errors() -> tuple[PaperValue, ...]:
     """Tables IV and V, abstract and conclusion."""
     return tuple(
-        PublishedError(**{**row, "power_w": float(row["power_w"]), "value": float(row["value"])})  # type: ignore[arg-type]
-        for row in _read("published_errors.csv")
+        PaperValue(**{**row, "power_w": float(row["power_w"]), "value": float(row["value"])})  # type: ignore[arg-type]
+        for row in _read("paper_errors.csv")
     )
 
 
 @functools.cache
-def published_theory() -> dict[float, float]:
+def paper_table_1() -> dict[float, float]:
     """Table I: the largest in-plane difference [um] between cone-sphere curve and ellipse, by half angle [deg]."""
-    return {float(row["half_angle_deg"]): float(row["in_plane_um"]) for row in _read("published_theory.csv")}
+    return {float(row["half_angle_deg"]): float(row["in_plane_um"]) for row in _read("paper_table_1.csv")}
 
 
-def published_value(source: str, trajectory: str, spotlights: str, quantity: str, metric: str) -> float | None:
+def paper_value(source: str, trajectory: str, spotlights: str, quantity: str, metric: str) -> float | None:
     """The published number [mm or deg], or None where the paper gives none."""
     wanted = (source, trajectory, spotlights, quantity, metric)
-    for row in published_errors():
+    for row in paper_errors():
         if (row.source, row.trajectory, row.spotlights, row.quantity, row.metric) == wanted:
             return row.value
     return None
 
 
-def published_means(
+def paper_means(
     source: str | None, trajectory: str, rigs: Iterable[str], metric: str, largest: float
 ) -> dict[str, float]:
     """The published AE by spotlight rig, where the paper has one and it lies among our errors, up to the `largest`.
@@ -91,7 +91,7 @@ def published_means(
     """
     found: dict[str, float] = {}
     for rig in rigs if source else ():
-        known = published_value(str(source), trajectory, rig, "AE", metric)
+        known = paper_value(str(source), trajectory, rig, "AE", metric)
         if known is not None and not known > 3.0 * largest:  # true for NaN: every frame failed
             found[rig] = known
     return found

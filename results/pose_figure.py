@@ -11,7 +11,7 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.ticker import MaxNLocator
 
-from conespot.results.paper_values import published_means
+from conespot.results.paper_values import paper_means
 from conespot.results.style import COLOURS, frame, panel_title, paper_label, plain_numbers
 from conespot.results.variants import ordered
 
@@ -36,7 +36,7 @@ def pose_figure(rows: pd.DataFrame, title: str, caption: str, source: str | None
     grid = figure.subplots(len(_PANELS), len(rigs), sharex=True, sharey="row", squeeze=False)
     for row, (what, unit, parts, overall) in enumerate(_PANELS):
         most = float(rows.loc[rows["status"] == "ok", overall].max())
-        published = published_means(source, str(rows["trajectory"].iloc[0]), rigs, overall, most)
+        published = paper_means(source, str(rows["trajectory"].iloc[0]), rigs, overall, most)
         for column, rig in enumerate(rigs):
             axes = grid[row, column]
             panel_title(axes, row * len(rigs) + column, what, rig)

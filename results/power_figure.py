@@ -11,7 +11,7 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
-from conespot.results.paper_values import REFERENCE_POWER_W, published_means
+from conespot.results.paper_values import REFERENCE_POWER_W, paper_means
 from conespot.results.style import COLOURS, frame, panel_title, paper_label, plain_numbers
 from conespot.results.variants import ordered
 
@@ -36,7 +36,7 @@ def power_figure(boxes: pd.DataFrame, title: str, caption: str, source: str | No
     paper = source if REFERENCE_POWER_W in powers else None
     for row, (what, unit, metric) in enumerate(_PANELS):
         here = boxes[boxes["metric"] == metric]
-        published = published_means(paper, str(boxes["trajectory"].iloc[0]), rigs, metric, float(here["max"].max()))
+        published = paper_means(paper, str(boxes["trajectory"].iloc[0]), rigs, metric, float(here["max"].max()))
         _scale(grid[row, 0], here, max(published.values(), default=0.0))
         for column, rig in enumerate(rigs):
             axes = grid[row, column]

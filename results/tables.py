@@ -17,8 +17,8 @@ from conespot.results.paper_values import (
     NOTES,
     REFERENCE_POWER_W,
     STEADY_ABOVE_W,
-    published_theory,
-    published_value,
+    paper_table_1,
+    paper_value,
 )
 from conespot.results.precision import precision_table
 from conespot.results.run import VOLUME_COLUMN, Run
@@ -95,7 +95,7 @@ def _table_1(run: Run) -> Table | None:
     lines: list[tuple[str, ...]] = []
     for row in run.theory.sort_values("half_angle_deg").to_dict("records"):
         angle, ours = row["half_angle_deg"], row["in_plane_um"]
-        known = next((v for a, v in published_theory().items() if math.isclose(a, angle)), math.nan)
+        known = next((v for a, v in paper_table_1().items() if math.isclose(a, angle)), math.nan)
         numbers = {
             "ours_um": ours,
             "published_um": known,
@@ -133,11 +133,11 @@ def reference_power(powers: set[float]) -> float:
     return near[0] if near else max(powers, default=math.nan)
 
 
-def _compare(key: Key, box: dict[str, Any], source: str) -> _Records:
+def _beside_paper(key: Key, box: dict[str, Any], source: str) -> _Records:
     """AE and ME of a box beside the published numbers, where the paper has them."""
     records: _Records = []
     for quantity, statistic in QUANTITIES.items():
-        known = published_value(source, key.trajectory, key.spotlights, quantity, key.metric)
+        known = paper_value(source, key.trajectory, key.spotlights, quantity, key.metric)
         if known is not None:
             ours = box[statistic]
             compared = {"quantity": quantity, "ours": ours, "published": known, "ratio": ours / known}
@@ -151,12 +151,12 @@ def _table_4(run: Run, variant: Variant, boxes: _Boxes) -> tuple[_Records, Block
     for metric in TABLE_METRICS:
         for key, box in here.items():
             if key.metric == metric:
-                records += _compare(key, box, "Table IV")
+                records += _beside_paper(key, box, "Table IV")
         for source in ("abstract", "conclusion"):
             for key, helix in here.items():
                 other = key._replace(trajectory="box")
                 if key.trajectory == "helix" and key.metric == metric and other in here:
-                    records += _compare(key._replace(trajectory=BOTH), _pooled(here[other], helix), source)
+                    records += _beside_paper(key._replace(trajectory=BOTH), _pooled(here[other], helix), source)
     return (records, _error_block(run, variant, records)) if records else None
 
 
@@ -176,9 +176,9 @@ def _table_5(run: Run, variant: Variant, boxes: _Boxes) -> tuple[_Records, Block
         at_reference(boxes, "bumps").items(), key=lambda item: list(TABLE_METRICS).index(item[0].metric)
     ):
         smooth = boxes.get(key._replace(surface="smooth"), {})
-        for record in _compare(key, box, "Table V"):
+        for record in _beside_paper(key, box, "Table V"):
             quantity = record["quantity"]
-            known = published_value("Table IV", key.trajectory, key.spotlights, quantity, key.metric)
+            known = paper_value("Table IV", key.trajectory, key.spotlights, quantity, key.metric)
             ratio = _ratio(record["ours"], smooth.get(QUANTITIES[quantity]))
             paper = _ratio(record["published"], known)
             records.append({**record, "over_smooth": ratio, "published_over_smooth": paper})

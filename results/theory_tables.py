@@ -11,7 +11,7 @@ import pandas as pd
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from conespot.results.paper_values import NOTES, published_theory
+from conespot.results.paper_values import NOTES, paper_table_1
 from conespot.results.style import COLOURS, frame, plain_numbers, save, style
 from conespot.results.table import Block, Table, number
 from conespot.scene.atomic import write_atomically
@@ -29,14 +29,14 @@ _LINES: dict[str, Any] = {"free": "-", "exact": (0, (5, 3))}
 _SHADES = ("#222222", "#0072B2", "#D55E00", "#009E73", "#8A6FB0", "#E69F00")
 
 
-def write_theory(folder: Path, records: Records, name: str, assumes: str) -> str:
+def write_theory_tables(folder: Path, records: Records, name: str, assumes: str) -> str:
     """Write table_1.csv, bounds.csv, budget.csv, design.csv, theory.txt, and the figures budget and design.
 
     `records` holds the rows of each of the four tables, `assumes` what they rest on. Returns theory.txt's text.
     Raises InputError for files that cannot be written.
     """
     frames = {table: pd.DataFrame(rows) for table, rows in records.items()}
-    known = published_theory()
+    known = paper_table_1()
     angles = frames["table_1"]["half_angle_deg"]
     frames["table_1"].insert(2, "published_um", [known.get(round(float(a), 6), math.nan) for a in angles])
     for table, data in frames.items():

@@ -17,7 +17,7 @@ _OURS = {
     "tables": re.compile(r"(table_\d+|power|precision)\.csv|tables\.(txt|md)"),
     "figures": re.compile(r"(figure_\d+|along|power)_.+\.(png|svg)"),
 }
-_SUMMARY = "tables.txt"
+_TEXT = "tables.txt"
 
 
 def write_results(run: Path) -> list[Path]:
@@ -38,7 +38,7 @@ def write_results(run: Path) -> list[Path]:
         boxes = read_boxes(path, found.rows)  # what follows rests on what is stored
     tables = make_tables(found, boxes)
     texts = {f"{table.name}.csv": table.frame.to_csv(index=False, float_format="%.9g") for table in tables}
-    texts[_SUMMARY] = "\n\n".join(table.text() for table in tables)
+    texts[_TEXT] = "\n\n".join(table.text() for table in tables)
     texts["tables.md"] = "\n".join(table.markdown() for table in tables)
     for name, text in texts.items():
         write_atomically(folders["tables"] / name, text.encode())
@@ -51,13 +51,13 @@ def write_results(run: Path) -> list[Path]:
     return [*written, report]
 
 
-def summary(run: Path) -> str:
+def tables_text(run: Path) -> str:
     """The tables that `write_results` wrote, as text for the terminal. Raises InputError if there are none."""
-    path = run / "tables" / _SUMMARY
+    path = run / "tables" / _TEXT
     try:
         return path.read_text(encoding="utf-8")
     except (OSError, UnicodeDecodeError):
-        raise InputError(f"{path}: cannot be read; `python -m results {run}` writes it") from None
+        raise InputError(f"{path}: cannot be read; `python -m conespot.results {run}` writes it") from None
 
 
 def _folder(path: Path) -> Path:

@@ -7,7 +7,7 @@ from scipy.stats import wilcoxon
 
 from conespot.campaigns.compare import compare as compare_command
 from conespot.results.compare_runs import compare_runs
-from conespot.results.comparison import compare, interval
+from conespot.results.comparison import compare_lights, interval
 from conespot.results.rows import Rows
 from conespot.scene import InputError
 
@@ -29,7 +29,7 @@ def two_lights(make_rows):
 def test_a_shift_is_found_with_scipy_s_p_value(two_lights):
     """Errors 4 um smaller at 850 nm; against the median, scipy's Wilcoxon test and a sentence that says better."""
     white, infrared = two_lights()
-    found = compare([Rows(pd.concat([white, infrared], ignore_index=True))], "led-b3", "ir850", "run")[0]
+    found = compare_lights([Rows(pd.concat([white, infrared], ignore_index=True))], "led-b3", "ir850", "run")[0]
     here = infrared["power_w"] == 1.0
     change = (infrared["position_error_mm"] - white["position_error_mm"])[here].to_numpy()
     line = found.table[found.table["power_w"] == 1.0].iloc[0]
@@ -44,7 +44,7 @@ def test_a_shift_is_found_with_scipy_s_p_value(two_lights):
 def test_no_shift_is_said_to_be_none(two_lights):
     """Errors that differ by scatter alone; against the sentence that the data cannot tell."""
     white, infrared = two_lights(shift_mm=0.0)
-    found = compare([Rows(white), Rows(infrared)], "led-b3", "ir850", "run")[0]
+    found = compare_lights([Rows(white), Rows(infrared)], "led-b3", "ir850", "run")[0]
     assert "the data cannot tell ir850 from led-b3" in found.sentence
     assert found.overall.low < 0.0 < found.overall.high
 
@@ -52,7 +52,7 @@ def test_no_shift_is_said_to_be_none(two_lights):
 def test_few_pairs_cannot_tell(two_lights):
     """Five poses with a huge shift; against the sentence that they are too few."""
     white, infrared = two_lights(shift_mm=1.0, poses=5)
-    found = compare([Rows(white), Rows(infrared)], "led-b3", "ir850", "run")[0]
+    found = compare_lights([Rows(white), Rows(infrared)], "led-b3", "ir850", "run")[0]
     assert not found.overall.tells
     assert "only 5 poses" in found.sentence
 
@@ -63,7 +63,7 @@ def test_failures_on_either_side_are_counted_and_tested(two_lights):
     lost = white["pose"] < 12
     white.loc[lost, "status"] = "failed"
     white.loc[lost, "position_error_mm"] = np.nan
-    found = compare([Rows(white), Rows(infrared)], "led-b3", "ir850", "run")[0]
+    found = compare_lights([Rows(white), Rows(infrared)], "led-b3", "ir850", "run")[0]
     assert (found.overall.failed_a, found.overall.failed_b, found.overall.poses) == (24, 0, 60)
     assert found.overall.pairs == 18
     assert found.overall.p_failures == pytest.approx(2.0 * 0.5**12)
@@ -74,7 +74,7 @@ def test_all_failed_on_one_side_still_gives_an_answer(two_lights):
     """White light fails everywhere; against no pairs and no exception."""
     white, infrared = two_lights()
     white = white.assign(status="failed", position_error_mm=np.nan)
-    found = compare([Rows(white), Rows(infrared)], "led-b3", "ir850", "run")[0]
+    found = compare_lights([Rows(white), Rows(infrared)], "led-b3", "ir850", "run")[0]
     assert found.overall.pairs == 0
     assert "cannot tell" in found.sentence
 
@@ -93,12 +93,14 @@ def test_rows_that_do_not_pair_are_refused(two_lights):
     """Other poses, an unknown light, two cameras at once; each against one sentence."""
     white, infrared = two_lights()
     with pytest.raises(InputError, match=r"differ by 0\.5 mm"):
-        compare([Rows(white), Rows(infrared.assign(true_x_mm=infrared["true_x_mm"] + 0.5))], "led-b3", "ir850", "run")
+        compare_lights(
+            [Rows(white), Rows(infrared.assign(true_x_mm=infrared["true_x_mm"] + 0.5))], "led-b3", "ir850", "run"
+        )
     with pytest.raises(InputError, match="no frames in the light 'ir940'"):
-        compare([Rows(white)], "led-b3", "ir940", "run")
+        compare_lights([Rows(white)], "led-b3", "ir940", "run")
     twice = pd.concat([infrared, infrared.assign(sensor="linear", case="other")], ignore_index=True)
     with pytest.raises(InputError, match="several frames of one pose"):
-        compare([Rows(white), Rows(twice)], "led-b3", "ir850", "run")
+        compare_lights([Rows(white), Rows(twice)], "led-b3", "ir850", "run")
 
 
 def test_a_run_gets_text_table_and_figures_with_its_exposures(two_lights, make_run, tmp_path):

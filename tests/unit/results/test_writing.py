@@ -1,4 +1,4 @@
-"""write_results, the report, and `python -m results`: a run folder alone is enough, and is not trusted."""
+"""write_results, the report, and `python -m conespot.results`: a run folder alone is enough, and is not trusted."""
 
 import base64
 import os
@@ -11,7 +11,7 @@ from html.parser import HTMLParser
 import pandas as pd
 import pytest
 
-from conespot.results import summary, write_results
+from conespot.results import tables_text, write_results
 from conespot.results.__main__ import main
 from conespot.scene import InputError
 
@@ -120,7 +120,7 @@ def test_a_campaign_that_describes_no_scene_still_gives_results(tmp_path, make_r
     frame = make_rows(poses=2, powers=(1.0,), trajectories=("box",), rigs=("single",))
     folder = make_run(tmp_path / "run", frame, document=make_campaign(scene=scene, sweep=None, name=7, made_with=[1]))
     write_results(folder)
-    assert "not stated" in summary(folder)
+    assert "not stated" in tables_text(folder)
 
 
 def test_what_the_rows_no_longer_give_is_removed_and_the_rest_left(tmp_path, make_run, make_rows):
@@ -140,7 +140,7 @@ def test_theory_alone_is_a_run(tmp_path, make_run):
     folder = make_run(tmp_path / "run", theory=True, document={"name": "theory", "theory": ["table-1"], "seed": 1})
     names = [path.name for path in write_results(folder)]
     assert names == ["table_1.csv", "tables.txt", "tables.md", "report.html"]
-    assert "Table I" in summary(folder)
+    assert "Table I" in tables_text(folder)
 
 
 def test_an_interrupted_write_leaves_no_half_file(tmp_path, make_run, make_rows, monkeypatch):
@@ -187,6 +187,6 @@ def test_the_command_refuses_what_is_no_run_with_exit_code_2(tmp_path):
     assert "no campaign.yaml" in done.stderr
 
 
-def test_a_summary_of_nothing_says_what_to_do(tmp_path):
-    with pytest.raises(InputError, match="python -m results"):
-        summary(tmp_path)
+def test_a_text_of_nothing_says_what_to_do(tmp_path):
+    with pytest.raises(InputError, match="python -m conespot.results"):
+        tables_text(tmp_path)
