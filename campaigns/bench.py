@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import itertools
-import math
 from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -11,11 +10,10 @@ from typing import TYPE_CHECKING
 import cv2
 import numpy as np
 
-from conespot.campaigns.knowledge import Knowledge
 from conespot.campaigns.plan import Case, Group, Plan, Unit, frame_seed, reference_seed, tile_seed, told
 from conespot.campaigns.row import Finding, Record
 from conespot.campaigns.store import made_with
-from conespot.localize import ESTIMATORS, Knowns, LocalizationFailure, locate
+from conespot.localize import LocalizationFailure, find_localizer, locate
 from conespot.localize.image import AnyImage, Reference
 from conespot.localize.outcome import Outcome
 from conespot.localize.sequence import AmbientMap
@@ -73,28 +71,29 @@ class Bench:
                 bound = self._bound(case, pose)
                 for localizer in case.localizers:
                     found = self._located(unit, case, image, localizer, unlit)
-                    findings.append(_finding(case, localizer, found, bound if localizer in ESTIMATORS else None))
+                    stated = bound if find_localizer(localizer).takes_knowledge else None
+                    findings.append(_finding(case, localizer, found, stated))
             if self._frames is not None:
                 radiance = background.copy()
                 for tile in tiles:
                     radiance[tile.crop.slices] += np.float32(power) * tile.radiance
-                self._keep(f"{cases[0].key}-{unit.pose:05d}", cases[0], pose, radiance, image)
+                self._keep(f"{cases[0].frame}-{unit.pose:05d}", cases[0], pose, radiance, image)
         return Record(unit=unit.key, findings=tuple(findings))
 
     def _located(self, unit: Unit, case: Case, image: AnyImage, localizer: str, unlit: Reference | None) -> Outcome:
         """What a localizer answers with what the case lets it know."""
+        entry = find_localizer(localizer)
+        oracle = self._plan.groups[unit.group].pose(unit.pose) if entry.needs_truth else None
+        knowns, reference = (case.knowledge.knowns, unlit) if entry.takes_knowledge else (None, None)
         scene = told(self._plan, unit, case)
-        if localizer in ESTIMATORS:
-            return locate(image, scene, localizer, knowns=knowns(case.knowledge), reference=unlit)
-        oracle = self._plan.groups[unit.group].pose(unit.pose) if localizer.endswith("-oracle") else None
-        return locate(image, scene, localizer, oracle=oracle)
+        return locate(image, scene, localizer, oracle=oracle, knowns=knowns, reference=reference)
 
     def _bound(self, case: Case, pose: Pose) -> float | None:
         """The root mean square error of the tip [mm] that no estimator with the case's knowledge beats."""
         if not self._plan.campaign.bounds:
             return None
         try:
-            return cramer_rao(case.scene, pose, electrons_of(case.scene), knowns(case.knowledge)).position_mm
+            return cramer_rao(case.scene, pose, electrons_of(case.scene), case.knowledge.knowns).position_mm
         except ValueError:
             return None
 
@@ -162,17 +161,6 @@ class Bench:
         header = frame_header(case.scene, pose, case.scene.power.value, made_with(self._plan))
         write_frame(self._frames / f"{name}.exr", radiance, header)
         write_preview(self._frames / f"{name}.png", image, case.scene.sensor.full_scale)
-
-
-def knowns(knowledge: Knowledge) -> Knowns:
-    """What a localizer may assume of the scene that it is told."""
-    angle = knowledge.half_angle_sigma
-    return Knowns(
-        rcm_sigma_mm=knowledge.rcm_sigma,
-        half_angle_sigma_deg=None if angle is None else math.degrees(angle),
-        eye_radius_sigma_mm=knowledge.eye_radius_sigma,
-        camera_height_sigma_mm=knowledge.camera_height_sigma,
-    )
 
 
 def _finding(case: Case, localizer: str, found: Outcome, bound: float | None) -> Finding:

@@ -1,16 +1,19 @@
 """What a campaign tells its localizers beside the image: the scene, how wrong, how well known, and unlit frames.
 
 The renderer has the true scene. A localizer is told one whose quantities carry errors drawn anew for every pose, the
-sigmas it may assume, and perhaps a reference. None of it is the pose.
+sigmas it may assume (`Knowns`, all that a localizer itself sees of this), and perhaps a reference. None of it is the
+pose.
 """
 
 from __future__ import annotations
 
+import math
 from typing import TYPE_CHECKING, Annotated, Any
 
 import numpy as np
 from pydantic import BeforeValidator, Field, PlainSerializer, model_validator
 
+from conespot.localize.model.prior import RCM_SIGMA_MM, Knowns
 from conespot.scene import Scene
 from conespot.scene.beam import stretched
 from conespot.scene.model import Model
@@ -46,7 +49,7 @@ class Knowledge(Model):
     """
 
     rcm_error: Length = Field(0.0, ge=0.0)
-    rcm_sigma: LengthSigma = 0.05
+    rcm_sigma: LengthSigma = RCM_SIGMA_MM
     half_angle_error: Angle = Field(0.0, ge=0.0)
     half_angle_sigma: AngleSigma = 0.0
     eye_radius_error: Length = Field(0.0, ge=0.0)
@@ -64,6 +67,17 @@ class Knowledge(Model):
         if self.sequence == 1:
             raise ValueError("sequence must be at least 2: one frame hides what its own patch covers")
         return self
+
+    @property
+    def knowns(self) -> Knowns:
+        """What a localizer may assume of the scene that it is told."""
+        angle = self.half_angle_sigma
+        return Knowns(
+            rcm_sigma_mm=self.rcm_sigma,
+            half_angle_sigma_deg=None if angle is None else math.degrees(angle),
+            eye_radius_sigma_mm=self.eye_radius_sigma,
+            camera_height_sigma_mm=self.camera_height_sigma,
+        )
 
     def told(self, scene: Scene, rng: np.random.Generator) -> Scene:
         """The scene as a localizer is told it at one pose."""

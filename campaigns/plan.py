@@ -27,7 +27,7 @@ MAX_ROWS = 1_000_000
 
 @dataclass(frozen=True)
 class Case:
-    """A scene with its power, a trajectory, what localizes its frames and with what knowledge.
+    """A combination of the campaign, and the localizers of all combinations that differ in those alone.
 
     Cases with the same `frame` look at the same images. `labels` are the columns of its rows that say what it is,
     `swept` those of other keys that are swept.
@@ -35,11 +35,20 @@ class Case:
 
     key: str
     frame: str
-    scene: Scene
+    campaign: Campaign
     localizers: tuple[str, ...]
-    knowledge: Knowledge
     labels: dict[str, str | float]
     swept: dict[str, str | float]
+
+    @property
+    def scene(self) -> Scene:
+        """The true scene, with its power."""
+        return self.campaign.scene
+
+    @property
+    def knowledge(self) -> Knowledge:
+        """What its localizers are told beside the image."""
+        return self.campaign.knowledge
 
 
 @dataclass(frozen=True)
@@ -191,8 +200,7 @@ def make_plan(document: Document) -> Plan:
     members: dict[str, list[Case]] = {}
     for i, (key, draft) in enumerate(drafts.items()):
         columns = [{name: values[i] for name, values in table.items()} for table in (labels, swept)]
-        chosen = draft.combination.campaign
-        cases.append(Case(key, draft.frame, chosen.scene, tuple(draft.localizers), chosen.knowledge, *columns))
+        cases.append(Case(key, draft.frame, draft.combination.campaign, tuple(draft.localizers), *columns))
         members.setdefault(draft.group, []).append(cases[-1])
     groups = []
     for key, shared in members.items():

@@ -31,10 +31,16 @@ _SWEPT = (*_CASE, "seed")
 
 
 def _known_localizer(value: Any) -> Any:
-    from conespot.localize import LOCALIZERS
+    from conespot.localize import find_localizer, localizer_names
 
-    if isinstance(value, str) and value not in LOCALIZERS:
-        raise unknown_name(value, list(LOCALIZERS), "localizer")
+    if isinstance(value, str):
+        known = localizer_names()
+        if value not in known:
+            raise unknown_name(value, known, "localizer")
+        try:
+            find_localizer(value)
+        except InputError as error:
+            raise ValueError(str(error)) from None
     return value
 
 

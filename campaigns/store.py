@@ -1,5 +1,6 @@
 """The run folder: what is finished, safe from a torn write, a second writer and another campaign's rows.
 
+`campaign.yaml` is the campaign as it was resolved, `cases.jsonl` what each of its cases is; both begin the run.
 `journal.jsonl` grows by one line per finished unit, each on the disk before the next; everything else in the folder
 is written whole or not at all, and can be made again from the journal.
 """
@@ -16,6 +17,7 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import IO
 
+from conespot.campaigns.description import description_lines
 from conespot.campaigns.ending import RunError, held_back
 from conespot.campaigns.plan import Plan
 from conespot.campaigns.row import Record, rows
@@ -101,6 +103,8 @@ def open_store(folder: Path, plan: Plan, document: Document) -> Iterator[Store]:
         begun_with = _begun_with(known)
         if begun_with.get("identity") != plan.identity:
             raise InputError(f"{folder}: holds the run of another campaign or other settings; choose another --out")
+        if plan.cases:
+            write_atomically(folder / "cases.jsonl", description_lines(plan))
         yield Store(folder, plan, journal, begun_with)
 
 

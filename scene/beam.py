@@ -14,7 +14,7 @@ from numpy.typing import ArrayLike, NDArray
 from pydantic import Field, model_validator
 
 from conespot.scene.model import Model
-from conespot.scene.quantity import Angle
+from conespot.scene.quantity import Angle, format_quantity
 
 Array = NDArray[np.float64]
 _HalfAngle = Annotated[Angle, Field(gt=0.0, lt=math.pi / 2.0)]
@@ -29,6 +29,11 @@ class HardBeam(Model):
     def intensity(self, cos_angle: ArrayLike) -> Array:
         """Relative radiant intensity at cosines of the angle off the axis, any shape."""
         return np.where(np.asarray(cos_angle, float) >= math.cos(self.half_angle), 1.0, 0.0)
+
+    @property
+    def words(self) -> str:
+        """The profile in words, as tables state it."""
+        return f"hard, half angle {format_quantity(self.half_angle, 'angle')}"
 
     @property
     def flux_factor(self) -> float:
@@ -48,6 +53,12 @@ class CyclesBeam(Model):
         cos_b = math.cos(self.half_angle)
         u = np.clip((np.asarray(cos_angle, float) - cos_b) / (self.blend * (1.0 - cos_b)), 0.0, 1.0)
         return u * u * (3.0 - 2.0 * u)
+
+    @property
+    def words(self) -> str:
+        """The profile in words, as tables state it."""
+        soft = " (fully soft)" if self.blend == 1.0 else ""
+        return f"Cycles blend {self.blend:g}{soft}, half angle {format_quantity(self.half_angle, 'angle')}"
 
     @property
     def flux_factor(self) -> float:
@@ -72,6 +83,12 @@ class LinearBeam(Model):
         """Relative radiant intensity at cosines of the angle off the axis, any shape."""
         angle = np.arccos(np.clip(np.asarray(cos_angle, float), -1.0, 1.0))
         return np.clip((self.half_angle - angle) / (self.half_angle - self.beam_width), 0.0, 1.0)
+
+    @property
+    def words(self) -> str:
+        """The profile in words, as tables state it."""
+        width, half_angle = (format_quantity(angle, "angle") for angle in (self.beam_width, self.half_angle))
+        return f"linear from {width}, half angle {half_angle}"
 
     @property
     def flux_factor(self) -> float:
@@ -108,6 +125,11 @@ class TabulatedBeam(Model):
         """Relative radiant intensity at cosines of the angle off the axis, any shape."""
         angle = np.arccos(np.clip(np.asarray(cos_angle, float), -1.0, 1.0))
         return np.interp(angle, self.angles, self.intensities, right=0.0)
+
+    @property
+    def words(self) -> str:
+        """The profile in words, as tables state it."""
+        return f"tabulated, half angle {format_quantity(self.half_angle, 'angle')}"
 
     @property
     def flux_factor(self) -> float:

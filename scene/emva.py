@@ -9,7 +9,7 @@ import numpy as np
 from pydantic import Field, model_validator
 
 from conespot.scene.model import Model
-from conespot.scene.quantity import Length, Seconds, Wavelength
+from conespot.scene.quantity import Length, Seconds, Wavelength, format_quantity
 from conespot.scene.spectrum import Curve, tabulated
 
 #: elementary charge [C], and h c / e [V nm]: a quantum efficiency times wavelength over it is a responsivity [A/W]
@@ -25,6 +25,11 @@ class LongPass(Model):
     kind: Literal["longpass"] = "longpass"
     edge: _Edge = 800.0
     transmission: _Fraction = 1.0
+
+    @property
+    def words(self) -> str:
+        """The filter in words."""
+        return f"long pass {format_quantity(self.edge, 'wavelength')}"
 
     def of(self, curve: Curve) -> Curve:
         """What the filter leaves of a curve."""
@@ -45,6 +50,11 @@ class BandPass(Model):
             raise ValueError("high must be above low")
         return self
 
+    @property
+    def words(self) -> str:
+        """The filter in words."""
+        return f"band pass {self.low:g} to {format_quantity(self.high, 'wavelength')}"
+
     def of(self, curve: Curve) -> Curve:
         """What the filter leaves of a curve."""
         return Curve(curve.wavelengths, curve.values * self.transmission).cut(self.low, self.high)
@@ -62,6 +72,12 @@ class Metering(Model):
     percentile: float = Field(99.5, gt=0.0, le=100.0)
     level: _Fraction = 0.8
     each: Literal["campaign", "frame"] = "campaign"
+
+    @property
+    def words(self) -> str:
+        """The rule in words."""
+        when = "once" if self.each == "campaign" else "every frame"
+        return f"metered {when} to {100.0 * self.level:g} % of saturation"
 
 
 #: columns of camera_qe_cmv12000.csv (averaged) of each channel of each chip
@@ -106,6 +122,13 @@ class Emva(Model):
     def full_scale(self) -> int:
         """Largest pixel value."""
         return int(2**self.bits - 1)
+
+    @property
+    def words(self) -> str:
+        """How radiance becomes values, in words as tables state it."""
+        exposed = self.metering.words if self.metering else f"exposed {1e3 * self.exposure_time:g} ms"
+        filters = "".join(f", {optical.words}" for optical in self.filters)
+        return f"{self.chip} (EMVA 1288), linear, {self.bits} bit, f/{self.f_number:g}, {exposed}{filters}"
 
     @property
     def saturation(self) -> float:

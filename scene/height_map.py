@@ -93,6 +93,12 @@ class ReliefMap(Model):
         rows = self.pitch * (len(self.points) - 1)
         return float(np.hypot(abs(self.x) + self.width / 2.0, abs(self.y) + rows / 2.0))
 
+    @property
+    def words(self) -> str:
+        """The map in words: its file, and the range of its heights."""
+        low, high = float(np.min(self.points)) * self.unit, float(np.max(self.points)) * self.unit
+        return f"height map {Path(self.file).name} ({low:.3g} to {high:.3g} mm)"
+
     @functools.cached_property
     def spline(self) -> Spline:
         """The heights [mm] between the nodes, in units of the pitch from the matrix's first element."""

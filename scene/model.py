@@ -11,6 +11,9 @@ from typing import Any
 from pydantic import BaseModel, BeforeValidator, ConfigDict, model_validator
 from pydantic_core import PydanticCustomError
 
+#: what a description means; raised whenever a default changes, or what a key does. A new key with a default does not
+SCHEMA = 1
+
 
 class Model(BaseModel):
     """A frozen description. An unknown key is refused with the nearest known one."""

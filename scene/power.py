@@ -3,13 +3,28 @@
 from __future__ import annotations
 
 import math
-from typing import Literal
+from dataclasses import dataclass
+from typing import Literal, assert_never
 
 from pydantic import Field
 
 from conespot.scene.beam import Beam
 from conespot.scene.model import Model
 from conespot.scene.quantity import Watts
+
+
+@dataclass(frozen=True)
+class BothConventions:
+    """A spotlight's power as Blender's watts and as those that leave the tip, and the radiant intensity they mean."""
+
+    isotropic_w: float
+    flux_w: float
+    axial_intensity: float  #: on the axis [W/sr]
+
+    @property
+    def words(self) -> str:
+        """Both, such as "1 W isotropic (3.08 mW flux)"."""
+        return f"{self.isotropic_w:.4g} W isotropic ({1e3 * self.flux_w:.3g} mW flux)"
 
 
 class Power(Model):
@@ -30,3 +45,19 @@ class Power(Model):
     def flux(self, beam: Beam) -> float:
         """Radiant flux that leaves the tip in the cone [W]."""
         return self.axial_intensity(beam) * beam.flux_factor
+
+    def both(self, beam: Beam) -> BothConventions:
+        """The power in both conventions."""
+        intensity = self.axial_intensity(beam)
+        return BothConventions(4.0 * math.pi * intensity, intensity * beam.flux_factor, intensity)
+
+    @property
+    def words(self) -> str:
+        """The convention in words, as tables state it."""
+        match self.convention:
+            case "isotropic":
+                return "isotropic (I0 = P / 4 pi)"
+            case "flux":
+                return "flux (P leaves the tip)"
+            case never:
+                assert_never(never)

@@ -9,7 +9,7 @@ from pydantic import Field
 
 from conespot.scene.emva import EMVA_PRESETS, Emva
 from conespot.scene.model import Model, named
-from conespot.scene.quantity import Radiance
+from conespot.scene.quantity import Radiance, format_quantity
 from conespot.scene.spectrum import Curve
 
 _White = Annotated[Radiance, Field(gt=0.0)]
@@ -36,6 +36,12 @@ class Srgb8(Model):
         return 255
 
     @property
+    def words(self) -> str:
+        """How radiance becomes values, in words as tables state it."""
+        channels = ", colour" if self.colour else ""
+        return f"sRGB, 8 bit, white {format_quantity(self.white, 'radiance')}{channels}"
+
+    @property
     def responses(self) -> dict[str, Curve] | None:
         """Relative response of each channel; None for the grey one, which weighs all light alike."""
         if not self.colour:
@@ -54,6 +60,11 @@ class Linear(Model):
     def full_scale(self) -> int:
         """Largest pixel value."""
         return int(2**self.bits - 1)
+
+    @property
+    def words(self) -> str:
+        """How radiance becomes values, in words as tables state it."""
+        return f"linear, {self.bits} bit, white {format_quantity(self.white, 'radiance')}"
 
 
 AnySensor = Srgb8 | Linear | Emva

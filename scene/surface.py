@@ -15,7 +15,7 @@ from pydantic import Field
 from conespot.scene.eye import Eye
 from conespot.scene.height_map import HeightMap
 from conespot.scene.model import Model, named
-from conespot.scene.quantity import Length
+from conespot.scene.quantity import Length, format_quantity
 
 Array = NDArray[np.float64]
 _Ratio = Annotated[float, Field(gt=0.5, lt=2.0)]
@@ -65,6 +65,20 @@ class Surface(Model):
         if self.height_map is not None:
             total += self.height_map.spline.bound
         return total
+
+    @property
+    def words(self) -> str:
+        """The surface in words, as tables state it: what it is made of, how much of it and how large."""
+        parts = []
+        if self.semi_axes != _SPHERE:
+            parts.append(f"ellipsoid {' x '.join(f'{ratio:g}' for ratio in self.semi_axes)}")
+        if self.bumps:
+            count = f"{len(self.bumps)} bump{'s' * (len(self.bumps) > 1)}"
+            across, high = _range([b.diameter for b in self.bumps]), _range([b.height for b in self.bumps])
+            parts.append(f"{count} ({across} across, {high} high)")
+        if self.height_map is not None:
+            parts.append(self.height_map.words)
+        return " with ".join(filter(None, [parts[0], " and ".join(parts[1:])])) if parts else "smooth"
 
     def displacement(self, eye: Eye, directions: ArrayLike) -> Array:
         """Displacement off the eye's sphere towards its centre `[...]` [mm] in unit directions `[..., 3]`."""
@@ -179,6 +193,12 @@ class Surface(Model):
         return on_wall / eye.radius
 
 
+def _range(lengths: list[float]) -> str:
+    """The lengths from the smallest to the largest, such as "0.2 to 0.5 mm"."""
+    low, high = min(lengths), max(lengths)
+    return format_quantity(low, "length") if low == high else f"{low:g} to {format_quantity(high, 'length')}"
+
+
 def bump_grid() -> Surface:
     """The paper's deformation (4.2): 15 bumps in a 3 x 5 grid, centred in equal cells of the 10 x 10 mm area."""
     return Surface(
@@ -197,8 +217,8 @@ AnySurface = Annotated[Surface, named(SURFACES, "surface")]
 def surface_name(surface: Surface) -> str:
     """`smooth`, `bumps`, or what a surface of one's own is made of."""
     for name, known in SURFACES.items():
-        if known == surface:
-            return name
+        if surface.height_map is None and known.model_dump_json() == surface.model_dump_json():
+            return name  # as they are written: a third of a millimetre read back from a file is another float
     parts = []
     if surface.semi_axes != _SPHERE:
         parts.append(f"ellipsoid {' x '.join(f'{ratio:g}' for ratio in surface.semi_axes)}")

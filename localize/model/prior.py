@@ -20,6 +20,9 @@ from conespot.scene.pose import Pose
 from conespot.scene.scene import Scene
 
 Array = NDArray[np.float64]
+#: how well the RCM is known where nobody says: an assumption and no measurement. An RCM that is 0.1 mm off sideways
+#: moves the tip by 12 um (3 mm high) to 25 um (6 mm), so this one leaves half of that
+RCM_SIGMA_MM = 0.05
 #: an "exactly" known RCM: far below anything an image can tell, yet well conditioned
 _EXACT_MM = 1e-6
 #: what may be free beside the pose; the first two are the beam's, which alone changes with them
@@ -37,7 +40,7 @@ class Knowns:
     The needle passes through the scene's RCM within `rcm_sigma_mm` sideways. Raises InputError for a negative value.
     """
 
-    rcm_sigma_mm: float | None = 0.05
+    rcm_sigma_mm: float | None = RCM_SIGMA_MM
     half_angle_sigma_deg: float | None = 0.0
     softness_sigma: float | None = 0.0  #: of a `cycles` beam's blend
     eye_radius_sigma_mm: float | None = 0.0

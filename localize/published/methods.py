@@ -31,7 +31,7 @@ from conespot.scene.pose import rot_x, rot_y
 _ROUND_PX = 0.1
 
 
-def paper(image: AnyImage, scene: Scene, oracle: Pose | None = None) -> Outcome:
+def paper(image: AnyImage, scene: Scene) -> Outcome:
     """The paper's text: Otsu, Eqs. 1-7, the ellipse in the plane of the outline, Eqs. 22-24.
 
     One spotlight: the candidate whose cone comes from the RCM. Several: of all combinations of candidates the one of
@@ -40,7 +40,7 @@ def paper(image: AnyImage, scene: Scene, oracle: Pose | None = None) -> Outcome:
     return _localize(image, scene, otsu_mask, text_candidates, np.median, None)
 
 
-def paper_code(image: AnyImage, scene: Scene, oracle: Pose | None = None) -> Outcome:
+def paper_code(image: AnyImage, scene: Scene) -> Outcome:
     """The authors' code, with the RCM (one spotlight) or the smallest spread (several) instead of the truth.
 
     Of several positions the code takes the one nearest their mean.
@@ -48,14 +48,14 @@ def paper_code(image: AnyImage, scene: Scene, oracle: Pose | None = None) -> Out
     return _localize(image, scene, coded_mask, _integer_candidates, _nearest_mean, None)
 
 
-def paper_code_float(image: AnyImage, scene: Scene, oracle: Pose | None = None) -> Outcome:
+def paper_code_float(image: AnyImage, scene: Scene) -> Outcome:
     """`paper_code` without its cutting of the outline to whole pixels, to see what that costs."""
     return _localize(image, scene, coded_mask, _float_candidates, _nearest_mean, None)
 
 
-def paper_code_oracle(image: AnyImage, scene: Scene, oracle: Pose | None = None) -> Outcome:
+def paper_code_oracle(image: AnyImage, scene: Scene, truth: Pose) -> Outcome:
     """The authors' code with their answer to the ambiguity: of each pair the candidate nearest the true tip."""
-    return _localize(image, scene, coded_mask, _integer_candidates, _nearest_mean, oracle)
+    return _localize(image, scene, coded_mask, _integer_candidates, _nearest_mean, truth)
 
 
 def text_candidates(outline: Contour, scene: Scene) -> Candidates | LocalizationFailure:
@@ -85,7 +85,7 @@ def _localize(
     segment: Callable[[np.ndarray], Mask],
     reconstruct: Callable[[Contour, Scene], Candidates | LocalizationFailure],
     unite: Callable[..., Array],
-    oracle: Pose | None,
+    truth: Pose | None,
 ) -> Outcome:
     patches = outlines(segment(grey8(image, scene)), len(scene.spotlights))
     if isinstance(patches, LocalizationFailure):
@@ -96,8 +96,8 @@ def _localize(
         if isinstance(pair, LocalizationFailure):
             return pair
         pairs.append(pair)
-    if oracle is not None:
-        positions = np.stack([_nearest(pair.apexes, oracle.apex) for pair in pairs])
+    if truth is not None:
+        positions = np.stack([_nearest(pair.apexes, truth.apex) for pair in pairs])
     elif len(pairs) == 1:
         if pairs[0].flattening < _ROUND_PX * scene.camera.pixel_pitch:
             return LocalizationFailure(NEAR_CIRCLE)

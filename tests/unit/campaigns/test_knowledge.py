@@ -5,10 +5,10 @@ import math
 import numpy as np
 import pytest
 
-from conespot.campaigns.bench import knowns
 from conespot.campaigns.knowledge import Knowledge
 from conespot.campaigns.plan import frame_seed, make_plan, told
 from conespot.campaigns.schema import base, read_campaign, resolved
+from conespot.localize import Knowns
 from conespot.scene import InputError, Scene
 from conespot.scene.document import dump
 
@@ -36,8 +36,8 @@ def campaign(tmp_path):
 def test_by_default_localizers_are_told_the_true_scene_and_an_rcm_known_to_a_twentieth_of_a_millimetre():
     scene = Scene()
     assert Knowledge().told(scene, np.random.default_rng(1)) == scene
-    assert knowns(Knowledge()).rcm_sigma_mm == 0.05
-    assert knowns(Knowledge()).free == ()
+    assert Knowledge().knowns.rcm_sigma_mm == Knowns().rcm_sigma_mm == 0.05
+    assert Knowledge().knowns.free == ()
 
 
 def test_errors_are_drawn_with_the_stated_standard_deviation():

@@ -1,0 +1,72 @@
+"""`cases.jsonl`: what the cases of a run are, so that whoever reads its rows need guess nothing.
+
+One JSON object a line and one line a case, in the order of the plan. Long tables of points that were read from a file
+stand as that file's name and a digest.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator
+from dataclasses import asdict
+from pathlib import Path
+from typing import Any
+
+from pydantic import BaseModel
+
+from conespot.campaigns.plan import Case, Plan
+from conespot.localize import find_localizer
+from conespot.scene.model import SCHEMA, identity
+from conespot.scene.words import assumed
+
+
+def descriptions(plan: Plan) -> Iterator[dict[str, Any]]:
+    """What each case of a plan is, as plain data."""
+    for case in plan.cases:
+        yield {
+            "schema": SCHEMA,
+            "key": case.key,
+            "frame": case.frame,
+            "labels": {**case.labels, **case.swept},
+            "localizers": {name: _words(name) for name in case.localizers},
+            "assumes": assumed(case.scene),
+            "watts": asdict(case.scene.power.both(case.scene.beam)),
+            "told": _plain(case.knowledge),
+            **_visited(case),
+            "bounds": plan.campaign.bounds,
+            "scene": _plain(case.scene),
+        }
+
+
+def description_lines(plan: Plan) -> bytes:
+    """The file's content, the same whenever and wherever the same campaign is read."""
+    return "".join(f"{json.dumps(case, ensure_ascii=False)}\n" for case in descriptions(plan)).encode()
+
+
+def _words(localizer: str) -> dict[str, str]:
+    entry = find_localizer(localizer)
+    return {"threshold": entry.threshold, "ambiguity": entry.ambiguity}
+
+
+def _visited(case: Case) -> dict[str, Any]:
+    campaign = case.campaign
+    counts = {"poses": campaign.poses, "samples": campaign.samples, "edge_samples": campaign.edge_samples}
+    return {"trajectory": _plain(campaign.trajectory), **counts}
+
+
+def _plain(model: BaseModel) -> dict[str, Any]:
+    data: dict[str, Any] = _without_points(model.model_dump(mode="json"))
+    return data
+
+
+def _without_points(data: Any) -> Any:
+    """Plain data with a digest in place of points that a file holds, and of that file its name alone."""
+    if isinstance(data, list):
+        return [_without_points(item) for item in data]
+    if not isinstance(data, dict):
+        return data
+    if data.get("points") and isinstance(data.get("file"), str):
+        digest = identity(json.dumps(data["points"]))
+        data = {**data, "file": Path(data["file"]).name, "digest": digest}
+        del data["points"]
+    return {key: _without_points(value) for key, value in data.items()}

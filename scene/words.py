@@ -1,0 +1,17 @@
+"""A scene in the words that stand beside every number: what somebody who reads a table must know it assumes."""
+
+from __future__ import annotations
+
+from conespot.scene.quantity import format_quantity
+from conespot.scene.scene import Scene
+
+
+def assumed(scene: Scene) -> dict[str, str]:
+    """Radius of the eye, edge of the beam, power convention, transfer of the sensor, and surface, in words by name."""
+    return {
+        "radius": format_quantity(scene.eye.radius, "length"),
+        "edge": scene.beam.words,
+        "power_convention": scene.power.words,
+        "transfer": scene.sensor.words,
+        "surface": scene.surface.words,
+    }
