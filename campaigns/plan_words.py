@@ -42,7 +42,7 @@ def summary(plan: Plan, workers: int) -> Iterator[str]:
     yield f"about {_duration(_seconds(plan) / workers)} on {workers} workers (on cores like those it was tuned on)"
     yield from _exposures(plan)
     if campaign.frames:
-        size = sum(len(g.positions) * g.frames * 4.0 * g.scene.camera.resolution**2 for g in plan.groups)
+        size = sum(len(g.positions) * g.frames * 4.0 * math.prod(g.scene.camera.shape) for g in plan.groups)
         yield f"frames take up to {size / 1e9:.1f} GB on the disk"
 
 
@@ -73,7 +73,7 @@ def _seconds(plan: Plan) -> float:
     total = 0.0
     seen = set()
     for group in plan.groups:
-        pixels = group.scene.camera.resolution**2
+        pixels = math.prod(group.scene.camera.shape)
         if group.scene_key not in seen:
             seen.add(group.scene_key)
             total += 3.0 + 4.0 * pixels / RAYS_PER_SECOND
@@ -93,7 +93,7 @@ def _tile_rays(group: Group, pose: Pose, spotlight: int) -> float:
     """Samples traced for the rectangle that holds a spotlight's patch, and for its edge."""
     scene = group.scene
     edge = scene.camera.project(scene.outline(pose, spotlight, points=32))
-    inside = np.clip(edge, 0.0, scene.camera.resolution)
+    inside = np.clip(edge, 0.0, scene.camera.shape[::-1])
     rays = float(np.prod(np.ptp(inside, axis=0))) * group.samples
     if group.edge_samples > group.samples:
         rays += len(rim_pixels(scene, pose, spotlight)) * group.edge_samples

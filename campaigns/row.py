@@ -134,7 +134,7 @@ class _Stated:
 def _in_frame(pose: Pose, scene: Scene) -> float:
     edge = np.concatenate([scene.outline(pose, k, points=64) for k in range(len(scene.spotlights))])
     pixels = scene.camera.project(edge)  # NaN where a ray misses the eye compares as outside
-    return float(np.mean(np.all((pixels >= 0.0) & (pixels <= scene.camera.resolution), axis=-1)))
+    return float(np.mean(np.all((pixels >= 0.0) & (pixels <= scene.camera.shape[::-1]), axis=-1)))
 
 
 def rows(plan: Plan, records: Mapping[str, Record]) -> Iterator[Row]:

@@ -26,11 +26,10 @@ def checked(image: ArrayLike, scene: Scene) -> AnyImage:
         raise InputError(f"image: pixels of type {array.dtype} cannot be read; give uint8, uint16 or float")
     if not (array.ndim == 2 or (array.ndim == 3 and array.shape[2] == 3)):
         raise InputError(f"image: shape {array.shape} is neither [H, W] nor [H, W, 3]")
-    side = scene.camera.resolution
-    if array.shape[:2] != (side, side):
+    if array.shape[:2] != scene.camera.shape:
         height, width = array.shape[:2]
         raise InputError(
-            f"image: {width} x {height} px do not fit scene.camera.resolution = {side} px; "
+            f"image: {width} x {height} px do not fit scene.camera.resolution = {scene.camera.resolution} px; "
             "give the whole frame, or the scene of the camera that took it"
         )
     if array.dtype.kind == "f" and not np.isfinite(array).all():

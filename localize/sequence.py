@@ -39,8 +39,7 @@ class AmbientMap:
         self._black = scene.sensor.black_level if isinstance(scene.sensor, Emva) else 0.0
         self._white = 1.0
         self._sum: NDArray[np.float32] | None = None
-        side = scene.camera.resolution
-        self._levels = np.zeros((side, side), np.float32)
+        self._levels = np.zeros(scene.camera.shape, np.float32)
         self._added: list[float] = []
 
     def add(self, image: NDArray[np.generic]) -> bool:

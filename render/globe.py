@@ -5,6 +5,8 @@ from __future__ import annotations
 import math
 from typing import Any
 
+import numpy as np
+
 from conespot.render import spectral
 from conespot.scene import Eye, Scene
 from conespot.scene.eye import Globe
@@ -45,7 +47,11 @@ def _pupil_to_world(mi: Any, eye: Eye, globe: Globe) -> Any:
 def near_plane(scene: Scene) -> float:
     """Distance from the camera [mm] behind which it sees: inside the eye, so that the wall above does not hide it."""
     eye, camera = scene.eye, scene.camera
-    reach = math.sqrt(2.0) * camera.sensor_width / 2.0 / camera.focal_length * (camera.height - eye.radius)
+    height, width = camera.shape
+    corners = camera.rays([(x, y) for x in (0, width) for y in (0, height)])
+    down = (eye.radius - corners.origins[..., 2]) / corners.directions[..., 2]
+    across = (corners.origins + down[:, None] * corners.directions)[:, :2]
+    reach = float(np.max(np.linalg.norm(across, axis=-1)))  # of what it sees at the height of the eye's centre
     top = eye.radius + math.sqrt(max(eye.radius**2 - reach**2, 0.0))
     return float(camera.height - 0.95 * top)
 

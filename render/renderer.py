@@ -56,8 +56,8 @@ class Renderer:
 
         With interreflection the light reaches the whole frame, and so does the tile.
         """
-        n = self.scene.camera.resolution
-        crop = self.footprint(pose, spotlight) if self.scene.interreflection is None else Crop(0, 0, n, n)
+        shape = self.scene.camera.shape
+        crop = self.footprint(pose, spotlight) if self.scene.interreflection is None else Crop.whole(shape)
         axis = spotlight_axes(pose, self.scene.spotlights)[spotlight]
         self._lit.update({"light.to_world": emitters.aim(self._mi, pose.apex, axis)})
         if spectral.has_water(self.scene):
@@ -67,7 +67,7 @@ class Renderer:
         self.rendered += 1
         radiance = self._lit.render(crop, self.samples, seed)
         if self.edge_samples > self.samples and radiance.size:
-            pixels = crop.pixels(n)
+            pixels = crop.pixels(shape[1])
             edge = np.isin(pixels, rim_pixels(self.scene, pose, spotlight))
             radiance[edge.reshape(crop.height, crop.width)] = self._lit.pixels(pixels[edge], self.edge_samples, seed)
         return Tile(crop, radiance)
@@ -80,7 +80,7 @@ class Renderer:
         # three times the relief covers any incidence up to 70 deg
         reach = np.concatenate([length + k * scene.surface.relief for k in (-3.0, 0.0, 3.0)])
         points = pose.apex + np.tile(rays / length, (3, 1)) * np.maximum(reach, 0.0)
-        return Crop.around(scene.camera.project(points), scene.camera.resolution, margin=2.0)
+        return Crop.around(scene.camera.project(points), scene.camera.shape, margin=2.0)
 
     def background(self, pose: Pose | None = None) -> Image:
         """The radiance `[H, W, C]` [W m-2 sr-1] in ambient light alone. With a visible shaft it needs the pose."""
@@ -98,9 +98,9 @@ class Renderer:
 
     @functools.cached_property
     def _empty_background(self) -> Image:
-        n = self.scene.camera.resolution
+        crop = Crop.whole(self.scene.camera.shape)
         self.rendered += 1
-        frame = self._ambient(with_shaft=False).render(Crop(0, 0, n, n), self._background_samples, BACKGROUND_SEED)
+        frame = self._ambient(with_shaft=False).render(crop, self._background_samples, BACKGROUND_SEED)
         frame.flags.writeable = False
         return frame
 

@@ -17,10 +17,10 @@ VERTEX_SPACING = 0.03
 
 def arc_extent(scene: Scene) -> float:
     """Half the side [mm] of the square, in arc coordinates, that holds all the retina the camera can see."""
-    n = scene.camera.resolution
-    along = np.linspace(0.0, n, 33)
-    border = np.concatenate([[(t, 0.0), (t, n), (0.0, t), (n, t)] for t in along])
-    points = scene.surface.intersect(scene.eye, scene.camera.centre, scene.camera.back_project(border))
+    along = np.linspace(0.0, 1.0, 33)
+    border = np.concatenate([[(t, 0.0), (t, 1.0), (0.0, t), (1.0, t)] for t in along]) * scene.camera.shape[::-1]
+    rays = scene.camera.rays(border)
+    points = scene.surface.intersect(scene.eye, rays.origins, rays.directions)
     limit = scene.eye.radius * math.pi / 2.0
     if np.any(np.isnan(points)):
         return limit

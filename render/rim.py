@@ -16,11 +16,11 @@ _STEP = 0.25
 
 
 def rim_pixels(scene: Scene, pose: Pose, spotlight: int) -> NDArray[np.uint32]:
-    """The pixels `[N]` of the frame (row * resolution + column, ascending) within half a pixel of a steep beam.
+    """The pixels `[N]` of the frame (row * width + column, ascending) within half a pixel of a steep beam.
 
     None where the beam is soft. Edges of shadows that bumps or the shaft cast are not among them.
     """
-    n, b = scene.camera.resolution, scene.beam.half_angle
+    (height, width), b = scene.camera.shape, scene.beam.half_angle
     rim = scene.camera.project(scene.outline(pose, spotlight))
     across = float(np.linalg.norm(rim - np.roll(rim, len(rim) // 2, axis=0), axis=-1).min())
     pixel = 2.0 * b / across  # the angle that a pixel sees where the patch is foreshortened most
@@ -34,6 +34,6 @@ def rim_pixels(scene: Scene, pose: Pose, spotlight: int) -> NDArray[np.uint32]:
         points = scene.camera.project(cone.outline(pose, spotlight, points=around))
         steps = np.arange(0.0, 1.0, _STEP)[:, None, None]
         column, row = np.floor(points + steps * (np.roll(points, -1, axis=0) - points)).astype(int).reshape(-1, 2).T
-        inside = (column >= 0) & (column < n) & (row >= 0) & (row < n)
-        found.append(np.unique(row[inside] * n + column[inside]))
+        inside = (column >= 0) & (column < width) & (row >= 0) & (row < height)
+        found.append(np.unique(row[inside] * width + column[inside]))
     return np.unique(np.concatenate([np.zeros(0, int), *found])).astype(np.uint32)

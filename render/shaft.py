@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import Any
 
 import numpy as np
@@ -36,15 +37,12 @@ def placed(mi: Any, shaft: Shaft, pose: Pose) -> dict[str, Any]:
 def shaft_crop(scene: Scene, shaft: Shaft, pose: Pose) -> Crop:
     """The part of the frame where the shaft or its shadow can be seen."""
     end, far = _ends(shaft, pose)
-    # only what is in front of the camera can be projected
-    top = min(far[2], scene.camera.height - 1.0)
-    if far[2] > top:
-        far = end + (far - end) * (top - end[2]) / (far[2] - end[2])
     rim = shaft.diameter / 2.0 * np.array([(x, y, z) for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)])
-    body = np.concatenate([p + rim for p in np.linspace(end, far, 64)])
+    # where it leaves the camera's sight is found to a third of a millimetre
+    body = np.concatenate([p + rim for p in np.linspace(end, far, max(64, math.ceil(3.0 * shaft.length)))])
     shadow = scene.surface.intersect(scene.eye, body, -scene.ambient.towards)
     shadow = shadow[np.all(np.isfinite(shadow), axis=1)]
-    return Crop.around(scene.camera.project(np.concatenate([body, shadow])), scene.camera.resolution, margin=2.0)
+    return Crop.around(scene.camera.project(np.concatenate([body, shadow])), scene.camera.shape, margin=2.0)
 
 
 def _ends(shaft: Shaft, pose: Pose) -> tuple[Array, Array]:

@@ -45,7 +45,7 @@ class Stage:
         """Load it. `like` is another stage of the same scene, whose retina is shared where the light plays no part."""
         mi, dr, chosen = kernel.load()
         self._mi, self._vectorized = mi, chosen.vectorized
-        self._resolution = scene.camera.resolution
+        self._columns = scene.camera.shape[1]
         reflectance = Reflectance(scene.retina)
         channels = spectral.channels(scene, light, responses)
         self.channels = len(channels)
@@ -88,12 +88,12 @@ class Stage:
         rows = max(1, PASS // (max(crop.width, 1) * samples))
         for first in range(0, crop.height if crop.width else 0, rows):
             band = Crop(crop.row + first, crop.column, min(rows, crop.height - first), crop.width)
-            values = self.pixels(band.pixels(self._resolution), samples, seed)
+            values = self.pixels(band.pixels(self._columns), samples, seed)
             image[first : first + rows] = values.reshape(band.height, band.width, -1)
         return image
 
     def pixels(self, pixels: NDArray[np.uint32], samples: int, seed: int) -> Image:
-        """The radiance `[N, C]` of the frame's pixels `[N]`, row * resolution + column, ascending."""
+        """The radiance `[N, C]` of the frame's pixels `[N]`, row * columns + column, ascending."""
         values = np.zeros((len(pixels), self.channels), np.float32)
         size = max(1, PASS // samples)
         for first in range(0, len(pixels), size):
@@ -108,15 +108,15 @@ class Stage:
         loaded, parameters = self._scenes[scene], self._parameters[scene]
         if self._vectorized:
             parameters.update()
-            return wavefront.trace(loaded, pixels, self._resolution, samples, seed)
+            return wavefront.trace(loaded, pixels, self._columns, samples, seed)
         # without a JIT the loop over samples must be Mitsuba's own, which knows rectangles alone
         values: list[Image] = []
         places = []
-        for crop in Crop.covering(pixels, self._resolution):
+        for crop in Crop.covering(pixels, self._columns):
             parameters["sensor.film.crop_offset"] = [crop.column, crop.row]
             parameters["sensor.film.crop_size"] = [crop.width, crop.height]
             parameters.update()
-            places.append(crop.pixels(self._resolution))
+            places.append(crop.pixels(self._columns))
             # the first pixel tells the rectangles' noise apart
             rendered = self._mi.render(loaded, spp=samples, seed=(seed + 7919 * int(places[-1][0])) % 2**32)
             values.append(np.asarray(rendered).reshape(crop.height * crop.width, -1))
@@ -129,8 +129,8 @@ def _sensor(mi: Any, scene: Scene, channels: list[spectral.Channel], samples: in
     responses = {f"channel_{i:02d}": spectral.film_spectrum(channel.film) for i, channel in enumerate(channels)}
     film = {
         "type": "specfilm",
-        "width": camera.resolution,
-        "height": camera.resolution,
+        "width": camera.shape[1],
+        "height": camera.shape[0],
         "crop_width": 1,
         "crop_height": 1,
         "component_format": "float32",

@@ -19,16 +19,27 @@ class Crop:
     width: int
 
     @classmethod
-    def around(cls, pixels: NDArray[np.float64], resolution: int, margin: float) -> Crop:
-        """The pixels within `margin` [px] of the bounding box of `pixels` `[N, 2]` (x, y), cut to the frame."""
-        low = np.clip(np.floor(pixels.min(axis=0) - margin), 0, resolution).astype(int)
-        high = np.clip(np.ceil(pixels.max(axis=0) + margin), 0, resolution).astype(int)
+    def whole(cls, shape: tuple[int, int]) -> Crop:
+        """All pixels of a frame of `shape` (rows, columns)."""
+        return cls(0, 0, *shape)
+
+    @classmethod
+    def around(cls, pixels: NDArray[np.float64], shape: tuple[int, int], margin: float) -> Crop:
+        """The pixels within `margin` [px] of the bounding box of `pixels` `[N, 2]` (x, y), cut to a frame of `shape`.
+
+        Pixels that are NaN, what the camera does not see, do not count.
+        """
+        seen = pixels[np.all(np.isfinite(pixels), axis=1)]
+        if not len(seen):
+            return cls(0, 0, 0, 0)
+        low = np.clip(np.floor(seen.min(axis=0) - margin), 0, shape[::-1]).astype(int)
+        high = np.clip(np.ceil(seen.max(axis=0) + margin), 0, shape[::-1]).astype(int)
         return cls(int(low[1]), int(low[0]), int(high[1] - low[1]), int(high[0] - low[0]))
 
     @classmethod
-    def covering(cls, pixels: NDArray[np.uint32], resolution: int) -> Iterator[Crop]:
-        """Rectangles that make up the pixels `[N]` (row * resolution + column, ascending)."""
-        row, column = np.divmod(pixels.astype(int), resolution)
+    def covering(cls, pixels: NDArray[np.uint32], columns: int) -> Iterator[Crop]:
+        """Rectangles that make up the pixels `[N]` (row * columns + column, ascending)."""
+        row, column = np.divmod(pixels.astype(int), columns)
         starts = np.flatnonzero((np.diff(column, prepend=-2) != 1) | (np.diff(row, prepend=-1) != 0))
         grown: Crop | None = None
         for start, end in zip(starts, [*starts[1:], len(pixels)], strict=True):
@@ -42,10 +53,10 @@ class Crop:
         if grown:
             yield grown
 
-    def pixels(self, resolution: int) -> NDArray[np.uint32]:
-        """Its pixels `[height * width]`, each row * resolution + column, ascending."""
-        rows, columns = (np.arange(s.start, s.stop, dtype=np.uint32) for s in self.slices)
-        return (rows[:, None] * np.uint32(resolution) + columns).ravel()
+    def pixels(self, columns: int) -> NDArray[np.uint32]:
+        """Its pixels `[height * width]`, each row * columns + column of the frame, ascending."""
+        row, column = (np.arange(s.start, s.stop, dtype=np.uint32) for s in self.slices)
+        return (row[:, None] * np.uint32(columns) + column).ravel()
 
     @property
     def slices(self) -> tuple[slice, slice]:

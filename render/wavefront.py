@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 from conespot.render import kernel
 
 
-def trace(loaded: Any, pixels: NDArray[np.uint32], resolution: int, samples: int, seed: int) -> NDArray[np.float32]:
-    """What the film's channels see `[N, C]` of the pixels `[N]` (row * resolution + column) of a Mitsuba scene.
+def trace(loaded: Any, pixels: NDArray[np.uint32], width: int, samples: int, seed: int) -> NDArray[np.float32]:
+    """What the film's channels see `[N, C]` of the pixels `[N]` (row * width + column) of a Mitsuba scene.
 
     The film must have the frame's first pixel as its crop. Each sample takes a cell of its own of the pixel's area, and
     one of the film's wavelengths; a pixel's depend on `seed` and its place in the frame, not on the other pixels asked
@@ -29,8 +29,8 @@ def trace(loaded: Any, pixels: NDArray[np.uint32], resolution: int, samples: int
     state, sequence = mi.sample_tea_32(first + k, second)
     random = mi.PCG32(initstate=mi.UInt64(state), initseq=mi.UInt64(sequence))
     columns = max(d for d in range(1, int(samples**0.5) + 1) if samples % d == 0)
-    x = mi.Float(pixel % resolution) + (mi.Float(k % columns) + random.next_float32()) / columns
-    y = mi.Float(pixel // resolution) + (mi.Float(k // columns) + random.next_float32()) * (columns / samples)
+    x = mi.Float(pixel % width) + (mi.Float(k % columns) + random.next_float32()) / columns
+    y = mi.Float(pixel // width) + (mi.Float(k // columns) + random.next_float32()) * (columns / samples)
     # a ray carries four wavelengths, each a quarter of the range from the next: cells of a quarter tell them all apart.
     # Cells of area and of wavelength are paired at random, or colours would lie across the pixel.
     wavelength = (mi.Float(mi.permute_kensler(k, samples, first)) + random.next_float32()) / (4 * samples)

@@ -104,9 +104,10 @@ class Surface(Model):
         nearest the eye's centre and the outside, to 1e-9 mm. A ray that grazes a flank may meet it more than once;
         then it is the meeting that is found from the wall.
         """
-        o, d = np.broadcast_arrays(np.asarray(origin, float), np.asarray(direction, float))
+        o, d = np.asarray(origin, float), np.asarray(direction, float)
         along = self._to_wall(eye, o, d)
         if not self.is_smooth:
+            o, d = np.broadcast_arrays(o, d)
             flat = self._to_surface(eye, o.reshape(-1, 3), d.reshape(-1, 3), along.ravel())
             along = flat.reshape(along.shape)
         return o + along[..., None] * d

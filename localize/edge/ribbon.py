@@ -47,7 +47,7 @@ class Ribbon:
         None if too few are in the frame.
         """
         scene = estimate.scene
-        edge = scene.camera.resolution // side
+        edge = np.array(scene.camera.shape[::-1]) // side
         curves, seen = [], []
         for k in range(len(scene.spotlights)):
             outline = scene.camera.project(scene.outline(estimate.pose, k, 180))

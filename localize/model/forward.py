@@ -80,29 +80,24 @@ def look(scene: Scene, pixels: Array, side: float = 1.0) -> Sight:
 
     Raises nothing: where a ray misses the eye the points are NaN.
     """
-    camera, eye = scene.camera, scene.eye
-    f, half = camera.focal_length_px, camera.resolution / 2.0
-    d = np.empty((len(pixels), 3))  # not normalized: its derivative is then constant
-    d[:, 0] = (pixels[:, 0] - half) / f
-    d[:, 1] = (half - pixels[:, 1]) / f
-    d[:, 2] = -1.0
-    if not scene.surface.is_sphere:
-        unit = d / np.linalg.norm(d, axis=1, keepdims=True)
-        points = scene.surface.intersect(eye, camera.centre, unit)
+    eye, rays = scene.eye, scene.camera.rays(pixels)
+    d = rays.directions
+    points = scene.surface.intersect(eye, rays.origins, d)
+    if scene.surface.is_sphere:
+        normals = (eye.centre - points) / eye.radius
+    else:
         outward = points - eye.centre
         normals = scene.surface.normals(eye, outward / np.linalg.norm(outward, axis=1, keepdims=True))
-        depth = camera.height - points[:, 2]
-    else:
-        lift = camera.height - eye.radius
-        d2 = d[:, 0] ** 2 + d[:, 1] ** 2 + 1.0
-        depth = (lift + np.sqrt(lift**2 - d2 * (lift**2 - eye.radius**2))) / d2
-        points = camera.centre + depth[:, None] * d
-        normals = (eye.centre - points) / eye.radius
+    distance = np.einsum("ij,ij->i", points - rays.origins, d)[:, None]
     facing = np.einsum("ij,ij->i", normals, d)
-    scale = side * depth / f
-    along_x, along_y = -(scale * normals[:, 0] / facing)[:, None] * d, (scale * normals[:, 1] / facing)[:, None] * d
-    along_x[:, 0] += scale
-    along_y[:, 1] -= scale
+
+    def along(origins: Array, directions: Array) -> Array:
+        """How the point moves with a ray that moves so: along the ray as far as keeps it on the surface."""
+        step = side * (origins + distance * directions)
+        return np.asarray(step - (np.einsum("ij,ij->i", normals, step) / facing)[:, None] * d)
+
+    along_x = along(rays.origins_by_x, rays.directions_by_x)
+    along_y = along(rays.origins_by_y, rays.directions_by_y)
     return Sight(points, normals, along_x, along_y)
 
 

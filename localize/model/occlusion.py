@@ -27,7 +27,7 @@ def covered(pixels: Array, pose: Pose, scene: Scene, *, side: float = 1.0, slack
     # half the pixel's diagonal on the retina; up at the shaft it is smaller
     pixel = (np.linalg.norm(sight.along_x, axis=1) + np.linalg.norm(sight.along_y, axis=1)) / 2.0
     margin = np.where(np.isfinite(pixel), pixel, 0.0) + slack
-    to_camera = scene.camera.centre - sight.points
+    to_camera = -scene.camera.rays(pixels).directions
     to_light = np.broadcast_to(scene.ambient.towards, sight.points.shape)
     hidden, shaded = (_meets(shaft, pose, sight.points, way, margin) for way in (to_camera, to_light))
     return hidden | shaded

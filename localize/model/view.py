@@ -38,7 +38,7 @@ class Window:
         low, high = points.min(axis=0), points.max(axis=0)
         size = float(np.max(high - low))
         side = max(1, int(np.ceil(size / bins)))
-        edge = scene.camera.resolution // side
+        edge = np.array(scene.camera.shape[::-1]) // side
         low = np.clip(np.floor((low - margin * size) / side), 0, edge).astype(int)
         high = np.clip(np.ceil((high + margin * size) / side), 0, edge).astype(int)
         if np.any(high - low < 6):
@@ -63,7 +63,7 @@ def outline(estimate: Estimate, spotlight: int, points: int = 96) -> Array:
 
 
 def _inside(pixels: Array, scene: Scene) -> NDArray[np.bool_]:
-    return np.asarray(np.all((pixels > 0.0) & (pixels < scene.camera.resolution), axis=1))
+    return np.asarray(np.all((pixels > 0.0) & (pixels < scene.camera.shape[::-1]), axis=1))
 
 
 def outlines(estimate: Estimate, points: int = 96) -> Array:

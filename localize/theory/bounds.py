@@ -63,10 +63,10 @@ class Bound:
 def patch_pixels(scene: Scene, pose: Pose, margin: float = 3.0) -> Array:
     """Centres `[N, 2]` [px] of the frame's pixels around all patches of a pose, `margin` [px] beyond the outlines."""
     points = np.concatenate([scene.camera.project(scene.outline(pose, k, 128)) for k in range(len(scene.spotlights))])
-    side = scene.camera.resolution
+    edge = scene.camera.shape[::-1]
     points = points[np.all(np.isfinite(points), axis=1)]
-    low = np.clip(np.floor(points.min(axis=0) - margin), 0, side).astype(int)
-    high = np.clip(np.ceil(points.max(axis=0) + margin), 0, side).astype(int)
+    low = np.clip(np.floor(points.min(axis=0) - margin), 0, edge).astype(int)
+    high = np.clip(np.ceil(points.max(axis=0) + margin), 0, edge).astype(int)
     return window(int(low[1]), int(low[0]), int(high[1] - low[1]), int(high[0] - low[0]))
 
 

@@ -10,7 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.integrate import quad
 
-from conespot.scene import Camera, Eye, Pose, Scene, load_scene
+from conespot.scene import Eye, Pose, Scene, load_scene
 from conespot.scene.beam import CyclesBeam, HardBeam, LinearBeam, TabulatedBeam
 from conespot.scene.power import Power
 from conespot.scene.spotlights import RIGS, spotlight_axes
@@ -26,29 +26,6 @@ BEAMS = [
     LinearBeam(),
     TabulatedBeam(angles=(0.0, 0.1, 0.12), intensities=(1.0, 0.6, 0.0)),
 ]
-
-
-def test_camera_is_table_ii():
-    camera = load_scene("paper-code").camera
-    assert math.degrees(camera.full_fov) == pytest.approx(6.8673, abs=5e-5)
-    assert camera.pixel_pitch * 5000 == pytest.approx(13.2)
-    assert camera.pixel_pitch == pytest.approx(2.64e-3)
-
-
-def test_the_pole_is_the_image_centre_and_y_runs_down():
-    camera = Camera(resolution=1000)
-    np.testing.assert_allclose(camera.project([0.0, 0.0, 0.0]), [500.0, 500.0])
-    x, y = camera.project([1.0, 2.0, 0.0])
-    assert x > 500.0 > y
-
-
-@given(st.floats(-5, 5), st.floats(-5, 5), st.floats(0, 20))
-def test_back_projection_inverts_projection(x, y, z):
-    camera = Camera()
-    point = np.array([x, y, z])
-    ray = camera.back_project(camera.project(point))
-    toward = point - camera.centre
-    np.testing.assert_allclose(ray, toward / np.linalg.norm(toward), atol=1e-12)
 
 
 @given(st.floats(-4, 4), st.floats(-4, 4), st.floats(2, 10), st.floats(-1, 1), st.floats(-1, 1), st.floats(-1, 1))
