@@ -17,10 +17,12 @@ from numpy.typing import NDArray
 
 from conespot.localize.edge.fit import fit_edge
 from conespot.localize.edge.sandwich import EdgeFit
+from conespot.localize.image import AnyImage, Frame
 from conespot.localize.model.forward import tangents
 from conespot.localize.model.noise import NoiseModel, noise_of
-from conespot.localize.model.prior import FREE, Knowns, value, with_value
+from conespot.localize.model.prior import FREE, Estimate, Knowns, value, with_value
 from conespot.localize.model.solve import inverse
+from conespot.localize.outcome import LocalizationFailure
 from conespot.localize.start.search import find_start
 from conespot.scene.beam import CyclesBeam
 from conespot.scene.document import InputError
@@ -96,7 +98,7 @@ class Calibration:
 
 
 def calibrate(
-    frames: Callable[[], Iterable[NDArray[np.generic]]],
+    frames: Callable[[], Iterable[AnyImage]],
     scene: Scene,
     *,
     width: Width = Width(),
@@ -119,10 +121,13 @@ def calibrate(
         here = _values(now)
         terms = []
         for image in frames():
-            start = find_start(image, now)
-            fit = start if isinstance(start, str) else fit_edge(image, now, start, tight, sensor)
-            if not isinstance(fit, str) and fit.settled:
-                terms.append(_seen(*_term(fit, now, tight, width, 6 if len(scene.spotlights) > 1 else 5), widths))
+            frame = Frame(image, scene.sensor)
+            start = find_start(frame, now)
+            if isinstance(start, LocalizationFailure):
+                continue
+            fit = fit_edge(frame, Estimate(start.pose, now), tight, sensor)
+            if not isinstance(fit, LocalizationFailure) and fit.settled:
+                terms.append(_seen(*_term(fit, now, tight, width), widths))
         if len(terms) < 3:
             raise InputError("calibration needs at least three frames in which the patch can be measured")
         # a frame that a vessel or a glint misled pulls the others: its step is the longest
@@ -190,10 +195,10 @@ def _disagreement(terms: list[tuple[Array, Array]], step: Array, widths: Array) 
     return max(1.0, total / max(told - len(step), 1))
 
 
-def _term(fit: EdgeFit, scene: Scene, tight: Knowns, width: Width, size: int) -> tuple[Array, Array]:
+def _term(fit: EdgeFit, scene: Scene, tight: Knowns, width: Width) -> tuple[Array, Array]:
     """A frame's information on the common quantities and its pull on them, its pose eliminated."""
     estimate = fit.estimate
-    free = tight.free
+    size, free = estimate.pose_size, tight.free
     kept = [FREE.index(name) for name in free]
     here, nominal = _values(estimate.scene)[kept], _values(scene)[kept]
     own_prior = 1.0 / np.square([tight.sigma(name) or np.inf for name in free])

@@ -1,9 +1,13 @@
-"""The image a localizer is given: checked, and turned to eight bits of grey for those that threshold."""
+"""The image a localizer is given: checked, and turned to light, or to eight bits of grey for those that threshold.
+
+A signal of 1 is white: the largest value a pixel can take.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import Any
 
 import cv2
@@ -11,8 +15,14 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from conespot.scene import InputError, Scene
+from conespot.scene.emva import Emva
+from conespot.scene.sensor import AnySensor, Srgb8
 
 AnyImage = NDArray[Any]  #: `[H, W]` or `[H, W, 3]` (RGB)
+Signal = NDArray[np.float32]  #: light, 1 is white
+#: share of a camera's range from which on a pixel counts as clipped. The noise of a pixel near the full well is cut off
+#: on one side: at 11,250 e- this is two sigmas of shot noise below it
+NEAR_FULL = 0.98
 
 
 def checked(image: ArrayLike, scene: Scene) -> AnyImage:
@@ -38,10 +48,31 @@ def checked(image: ArrayLike, scene: Scene) -> AnyImage:
 
 
 @dataclass(frozen=True, eq=False)
+class Frame:
+    """A checked image and the sensor that took it: light, wherever a fit looks.
+
+    A patch takes up little of a frame, so only what is looked at is decoded: all 25 Mpx would take longer than the fit.
+    """
+
+    pixels: AnyImage
+    sensor: AnySensor
+
+    @property
+    def side(self) -> int:
+        """Pixels a side."""
+        return len(self.pixels)
+
+    def light(self, rows: slice, columns: slice) -> tuple[Signal, NDArray[np.bool_]]:
+        """Signals [white] of some pixels, and which of them are clipped and only bounds: `[h, w, C]` each."""
+        signal, clipped = linear_light(np.ascontiguousarray(self.pixels[rows, columns]), self.sensor)
+        return signal.reshape(*signal.shape[:2], -1), clipped.reshape(*clipped.shape[:2], -1)
+
+
+@dataclass(frozen=True, eq=False)
 class Reference:
     """A view without spotlights: `pixels` `[H, W]` or `[H, W, 3]`, 1 is white, the mean of `frames` frames."""
 
-    pixels: NDArray[np.float32]
+    pixels: Signal
     frames: float = 1.0
 
     @classmethod
@@ -69,6 +100,42 @@ class Reference:
 def white_level(image: AnyImage, scene: Scene) -> int:
     """The largest value a pixel of an image of whole numbers can take."""
     return scene.sensor.full_scale if image.dtype == np.uint16 else 255
+
+
+def linear_light(pixels: AnyImage, sensor: AnySensor) -> tuple[Signal, NDArray[np.bool_]]:
+    """Signals [white] of pixel values of any shape, and which of them are clipped and only bounds.
+
+    uint8: 255 is white; uint16: the sensor's full scale; float: 1.0. An sRGB sensor's transfer is undone, a camera's
+    black level taken off. Raises InputError for any other type.
+    """
+    if isinstance(sensor, Emva):
+        full = 255.0 if pixels.dtype == np.uint8 else sensor.full_scale if pixels.dtype == np.uint16 else 1.0
+        value = pixels.astype(np.float32) / np.float32(full)
+        black = sensor.black_level / sensor.full_scale
+        limit = black + NEAR_FULL * min(1.0 - black, sensor.saturation * sensor.gain / sensor.full_scale)
+        return value - np.float32(black), value >= limit
+    srgb = isinstance(sensor, Srgb8)
+    if pixels.dtype == np.uint8 or pixels.dtype == np.uint16:
+        full = 255 if pixels.dtype == np.uint8 else min(sensor.full_scale, 65535)
+        table = _table(full, 256 if pixels.dtype == np.uint8 else 65536, srgb)
+        return table[pixels], np.asarray(pixels, np.uint16) >= full
+    if np.issubdtype(pixels.dtype, np.floating):
+        signal = pixels.astype(np.float32)
+        clipped = signal >= 1.0
+        return (_srgb_decode(signal).astype(np.float32) if srgb else signal), clipped
+    raise InputError(f"an image must be uint8, uint16 or float, not {pixels.dtype}")
+
+
+@lru_cache(maxsize=8)
+def _table(full: int, size: int, srgb: bool) -> Signal:
+    code = np.minimum(np.arange(size) / full, 1.0)
+    return (_srgb_decode(code) if srgb else code).astype(np.float32)
+
+
+def _srgb_decode(code: ArrayLike) -> NDArray[np.float64]:
+    """IEC 61966-2-1."""
+    c = np.asarray(code, float)
+    return np.where(c <= 0.04045, c / 12.92, ((np.maximum(c, 0.04045) + 0.055) / 1.055) ** 2.4)
 
 
 def grey8(image: AnyImage, scene: Scene) -> NDArray[np.uint8]:

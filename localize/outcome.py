@@ -10,7 +10,10 @@ from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
 
-#: reasons of the published methods; a reason is counted by its text, so it carries no numbers
+#: reasons of more than one stage; a reason is counted by its text, so it carries no numbers
+COVERED: Final = "too little of the patch is in the frame"
+UNCERTAIN: Final = "too uncertain: the patch and what is known do not hold the tip within the limit"
+#: reasons of the published methods
 NOTHING_FOUND: Final = "nothing found: no patch stands out of the background"
 FEWER_PATCHES: Final = "fewer patches than spotlights"
 CUT_BY_BORDER: Final = "patch cut by the image border"

@@ -12,11 +12,11 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from conespot.localize.image import Reference, white_level
+from conespot.localize.image import AnyImage, Frame, Reference, white_level
 from conespot.localize.model.noise import NoiseModel, noise_of
 from conespot.localize.model.prior import Estimate, Knowns
 from conespot.localize.model.view import outlines
-from conespot.localize.outcome import Outcome
+from conespot.localize.outcome import LocalizationFailure, Outcome
 from conespot.localize.photometric import photometric
 from conespot.localize.start.search import find_start
 from conespot.scene.document import InputError
@@ -42,10 +42,10 @@ class AmbientMap:
         self._levels = np.zeros(scene.camera.shape, np.float32)
         self._added: list[float] = []
 
-    def add(self, image: NDArray[np.generic]) -> bool:
+    def add(self, image: AnyImage) -> bool:
         """Add a checked frame; False, and nothing added, if no patch can be found in it to leave out."""
-        start = find_start(image, self._scene)
-        if isinstance(start, str):
+        start = find_start(Frame(image, self._scene.sensor), self._scene)
+        if isinstance(start, LocalizationFailure):
             return False
         points = outlines(Estimate(start.pose, self._scene))
         if not len(points):
@@ -101,7 +101,7 @@ class SequenceResult:
 
 
 def locate_sequence(
-    frames: Callable[[], Iterable[NDArray[np.generic]]],
+    frames: Callable[[], Iterable[AnyImage]],
     scene: Scene,
     *,
     knowns: Knowns | None = None,

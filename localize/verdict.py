@@ -8,16 +8,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from conespot.localize.model.prior import Estimate, Knowns, rcm_miss
-from conespot.localize.outcome import Localization, LocalizationFailure, Outcome
+from conespot.localize.outcome import COVERED, UNCERTAIN, Localization, LocalizationFailure, Outcome
 from conespot.scene.scene import Scene
 
 Array = NDArray[np.float64]
-UNCERTAIN = "too uncertain: the patch and what is known do not hold the tip within the limit"
 MISSES_RCM = "the axis misses the remote centre of motion by more than both their errors allow"
 MISFIT = "the light in the patch contradicts the model of the beam"
 OUTSIDE = "the fitted tip is outside the eye"
 BEHIND = "the fitted tip is behind the remote centre of motion"
-COVERED = "too little of the patch is in the frame"
 UNSETTLED = "the fit does not settle"
 #: largest sigma of the tip that is returned [mm]; a free fit may run off along what it hardly sees, a tied one cannot
 LARGEST_SIGMA_MM = 0.15
@@ -51,7 +49,7 @@ def judged(
     inwards = estimate.pose.apex - np.asarray(nominal.instrument.rcm)
     if float(inwards @ estimate.pose.axis) <= 0.0:
         return LocalizationFailure(BEHIND)
-    size = 6 if len(nominal.spotlights) > 1 else 5
+    size = estimate.pose_size
     pose = covariance[:size, :size].copy()
     pose[np.arange(3), np.arange(3)] += _FLOOR_MM**2
     pose[np.arange(3, size), np.arange(3, size)] += _FLOOR_RAD**2

@@ -3,92 +3,90 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from conespot.localize.edge.band import BandFit, fit_band
 from conespot.localize.edge.sandwich import EdgeFit
 from conespot.localize.edge.saturated import SaturatedFit, fit_saturated
-from conespot.localize.model.noise import NoiseModel, linear_light
+from conespot.localize.edge.settings import EDGE, Level
+from conespot.localize.image import Frame, Reference
+from conespot.localize.model.noise import NoiseModel
 from conespot.localize.model.prior import Estimate, Knowns
 from conespot.localize.model.profile import Profile
-from conespot.localize.model.view import Unlit, outlines
-from conespot.localize.start.search import Start
-from conespot.localize.verdict import COVERED, UNCERTAIN
+from conespot.localize.model.view import outlines
+from conespot.localize.outcome import COVERED, UNCERTAIN, LocalizationFailure
 from conespot.scene.scene import Scene
-
-#: bins across the patch, bins inside and outside the outline, iterations
-_RIM = ((30, 5.0, 3.0, 6), (70, 5.0, 3.0, 5))
-_SOFT = ((30, 6.0, 2.0, 6), (40, 14.0, 3.0, 16))
-#: a sharp edge and a clipped patch's rim end at full resolution
-_FULL = (1, 5.0, 3.0, 16)
-#: a step this short [sigmas] ends a stage that others follow, and the last one
-_ENOUGH = (1.0, 0.3)
-_CLIPPED, _THROUGHOUT = 0.3, 0.9  # shares from which on a patch counts as clipped, and as clipped throughout
-_SATURATED = (30, 90)  # bins across a patch that is clipped throughout, before full resolution
 
 
 def is_sharp(scene: Scene) -> bool:
     """Whether the beam's edge is a step rather than a slope."""
-    return Profile.of(scene.beam).angle_at(0.5) > 0.97 * scene.beam.half_angle
+    return Profile.of(scene.beam).angle_at(0.5) > EDGE.sharp * scene.beam.half_angle
 
 
-def is_clipped(image: NDArray[np.generic], scene: Scene, start: Start) -> bool:
+def is_clipped(frame: Frame, start: Estimate) -> bool:
     """Whether so much of the middle of the patch is clipped that only its rim can be measured."""
-    return _clipped_share(image, scene, start) > _CLIPPED
+    return _clipped_share(frame, start) > EDGE.clipped
 
 
-def _clipped_share(image: NDArray[np.generic], scene: Scene, start: Start) -> float:
-    points = outlines(Estimate(start.pose, scene))
+def _clipped_share(frame: Frame, start: Estimate) -> float:
+    points = outlines(start)
     if not len(points):
         return 0.0
     column, row = np.round(points.mean(axis=0)).astype(int)
-    reach = max(2, int(0.2 * np.min(np.ptp(points, axis=0))))
-    cut = image[max(0, row - reach) : row + reach, max(0, column - reach) : column + reach]
+    reach = max(2, int(EDGE.middle * np.min(np.ptp(points, axis=0))))
     stride = max(1, reach // 16)
-    return float(np.mean(linear_light(cut[::stride, ::stride], scene)[1])) if cut.size else 0.0
+    rows, columns = (slice(max(0, at - reach), at + reach, stride) for at in (row, column))
+    clipped = frame.light(rows, columns)[1]
+    return float(np.mean(clipped)) if clipped.size else 0.0
 
 
 def fit_edge(
-    image: NDArray[np.generic],
-    scene: Scene,
-    start: Start,
+    frame: Frame,
+    start: Estimate,
     knowns: Knowns,
     noise: NoiseModel,
-    unlit: Unlit | None = None,
-) -> EdgeFit | str:
+    reference: Reference | None = None,
+) -> EdgeFit | LocalizationFailure:
     """The band fit, coarse to fine, or why there is none."""
-    points = outlines(Estimate(start.pose, scene))
-    if len(points) < 10:
-        return COVERED
-    spotlights = len(scene.spotlights)
-    size = float(np.max(np.ptp(points, axis=0))) / (1.0 if spotlights == 1 else 2.0)
-    sharp, clipped = is_sharp(scene), _clipped_share(image, scene, start)
-    estimate = Estimate(start.pose, scene)
-    if sharp and clipped > _THROUGHOUT:
-        saturated: SaturatedFit | None = None
-        for number, side in enumerate([side for side in (int(size / bins) for bins in _SATURATED) if side > 1] + [1]):
-            saturated = fit_saturated(image, estimate, knowns, side=side, tied=number == 0)
-            if saturated is None:
-                return UNCERTAIN if number else COVERED
-            estimate = saturated.estimate
-        assert saturated is not None
-        return saturated
-    full = sharp or clipped > _CLIPPED
-    stages = [
-        (max(1, int(size / bins)), inner, outer, turns) for bins, inner, outer, turns in (_RIM if full else _SOFT)
-    ]
-    if full:
-        stages = [stage for stage in stages if stage[0] > 1]
-        stages.append(_FULL)
+    points = outlines(start)
+    if len(points) < EDGE.fewest_points:
+        return LocalizationFailure(COVERED)
+    size = float(np.max(np.ptp(points, axis=0))) / (1.0 if len(start.scene.spotlights) == 1 else 2.0)
+    sharp, clipped = is_sharp(start.scene), _clipped_share(frame, start)
+    if sharp and clipped > EDGE.throughout:
+        return _throughout(frame, start, knowns, size)
+    full = sharp or clipped > EDGE.clipped
     fit: BandFit | None = None
-    for number, (side, inner, outer, iterations) in enumerate(stages):
-        fit = fit_band(
-            image, estimate, fit, knowns, noise,
-            side=side, inner=inner, outer=outer, iterations=iterations,
-            enough=_ENOUGH[number + 1 == len(stages)], tied=number == 0, unlit=unlit,
-        )  # fmt: skip
-        if fit is None:
-            return UNCERTAIN if number else COVERED
-        estimate = fit.estimate
+    stages = _stages(EDGE.rim if full else EDGE.soft, size)
+    for number, (side, level) in enumerate(stages):
+        enough = EDGE.enough[number + 1 == len(stages)]
+        found = fit_band(
+            frame, start, fit, knowns, noise, reference, side=side, level=level, enough=enough, tied=number == 0
+        )
+        if isinstance(found, LocalizationFailure):
+            # what starts inside the frame and leaves it has run off
+            return LocalizationFailure(UNCERTAIN) if number else found
+        fit, start = found, found.estimate
+    assert fit is not None
+    return fit
+
+
+def _stages(levels: tuple[Level, ...], size: float) -> list[tuple[int, Level]]:
+    """The levels with the sides of their bins [px] on a patch of `size` [px].
+
+    Where the last takes every pixel, coarser ones whose bins would be pixels too are left out.
+    """
+    stages = [(1 if level.bins is None else max(1, int(size / level.bins)), level) for level in levels]
+    return [stage for stage in stages if stage[0] > 1 or stage[1].bins is None or levels[-1].bins is not None]
+
+
+def _throughout(frame: Frame, start: Estimate, knowns: Knowns, size: float) -> SaturatedFit | LocalizationFailure:
+    """The fit of a patch that is clipped throughout, coarse to fine."""
+    fit: SaturatedFit | None = None
+    sides = [side for side in (int(size / bins) for bins in EDGE.saturated_bins) if side > 1]
+    for number, side in enumerate([*sides, 1]):
+        found = fit_saturated(frame, start, knowns, side=side, tied=number == 0)
+        if isinstance(found, LocalizationFailure):
+            return LocalizationFailure(UNCERTAIN) if number else found
+        fit, start = found, found.estimate
     assert fit is not None
     return fit

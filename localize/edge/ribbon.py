@@ -3,22 +3,25 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from conespot.localize.edge.settings import EDGE
 from conespot.localize.edge.strips import WIDTH, Strips
+from conespot.localize.image import Frame, Reference
 from conespot.localize.model.forward import look
+from conespot.localize.model.noise import NoiseModel
 from conespot.localize.model.occlusion import covered
 from conespot.localize.model.outline import distances
 from conespot.localize.model.prior import Estimate
-from conespot.localize.model.view import Channel, Unlit, Window, shown_in
+from conespot.localize.model.view import Shown, Window, log_albedo
+from conespot.scene.scene import Scene
 from conespot.scene.spotlights import spotlight_axes
 
 Array = NDArray[np.float64]
-_FEWEST = 40  # bins
 
 
 @dataclass(frozen=True)
@@ -27,21 +30,14 @@ class Ribbon:
 
     pixels: Array  #: centres of the bins `[N, 2]` [px]
     spots: NDArray[np.intp]  #: the spotlight whose outline is nearest `[N]`
-    shown: tuple[Channel, ...]  #: what the bins show, `[N]` each
+    shown: tuple[Shown, ...]  #: what the bins show, `[N]` each
     strips: Strips
     covered: float  #: share of the outlines that the frame shows
+    at: Window  #: that the bins are in
+    cells: tuple[NDArray[np.intp], NDArray[np.intp]]  #: their rows and columns there
 
     @classmethod
-    def along(
-        cls,
-        image: NDArray[np.generic],
-        estimate: Estimate,
-        *,
-        side: int,
-        inner: float,
-        outer: float,
-        unlit: Unlit | None = None,
-    ) -> Ribbon | None:
+    def along(cls, frame: Frame, estimate: Estimate, *, side: int, inner: float, outer: float) -> Ribbon | None:
         """Bins of `side` x `side` px up to `inner` bins inside the outlines and `outer` outside.
 
         None if too few are in the frame.
@@ -56,7 +52,7 @@ class Ribbon:
             inside = finite & np.all((points > 1.0) & (points < edge - 2.0), axis=1)
             inside &= ~covered(outline, estimate.pose, scene, side=side)
             seen.append(float(np.mean(inside)))
-            if inside.sum() >= 10:
+            if inside.sum() >= EDGE.fewest_points:
                 curves.append(points[finite])
         if not curves:
             return None
@@ -72,10 +68,10 @@ class Ribbon:
         row, column = np.nonzero(mask)
         pixels = (np.stack([column + low[0], row + low[1]], axis=1) + 0.5) * side
         spots, alone = _nearest_outline(pixels, estimate)
-        distance = distances(pixels, spots, estimate, roll=len(scene.spotlights) > 1)[0] / side
+        distance = distances(pixels, spots, estimate)[0] / side
         keep = np.isfinite(distance) & alone & (distance > -inner) & (distance < outer)
         keep &= ~covered(pixels, estimate.pose, scene, side=side)
-        if np.count_nonzero(keep) < _FEWEST:
+        if np.count_nonzero(keep) < EDGE.fewest_bins:
             return None
         row, column, pixels, spots, distance = row[keep], column[keep], pixels[keep], spots[keep], distance[keep]
         at = Window(int(low[1]) * side, int(low[0]) * side, mask.shape[0], mask.shape[1], side)
@@ -85,8 +81,15 @@ class Ribbon:
         spot = spots[order][first]
         turns = tuple(slice(*np.searchsorted(spot, [k, k + 1])) for k in np.unique(spot))
         strips = Strips(compact, distance[order], first, turns)
-        shown = tuple(plane.at(row[order], column[order]) for plane in shown_in(image, scene, at, unlit))
-        return cls(pixels[order], spots[order], shown, strips, float(np.mean(seen)))
+        cells = row[order], column[order]
+        shown = tuple(plane.at(*cells) for plane in Shown.each(frame, at))
+        return cls(pixels[order], spots[order], shown, strips, float(np.mean(seen)), at, cells)
+
+    def told(self, reference: Reference, scene: Scene, noise: NoiseModel) -> Ribbon:
+        """The same with the albedo that a reference shows."""
+        told = zip(self.shown, *log_albedo(reference, scene, self.at, noise), strict=True)
+        shown = tuple(plane.told(albedo[self.cells], variance[self.cells]) for plane, albedo, variance in told)
+        return replace(self, shown=shown)
 
 
 def _strip_of(

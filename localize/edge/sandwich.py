@@ -10,11 +10,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from conespot.localize.model.prior import Estimate
-from conespot.localize.model.solve import inverse
+from conespot.localize.model.solve import STEP, inverse
 
 Array = NDArray[np.float64]
-#: a last step longer than this, in sigmas of the fit, means that the fit does not settle
-SETTLED_SIGMAS = 1.0
 
 
 @dataclass(frozen=True)
@@ -46,7 +44,7 @@ class EdgeFit(ABC):
     @property
     def settled(self) -> bool:
         """Whether the last step was short."""
-        return float(self.step @ np.linalg.solve(self.covariance, self.step)) < SETTLED_SIGMAS**2
+        return float(self.step @ np.linalg.solve(self.covariance, self.step)) < STEP.settled_sigmas**2
 
     @property
     def correlation(self) -> float:

@@ -14,17 +14,17 @@ from numpy.typing import NDArray
 
 from conespot.localize.edge.ribbon import Ribbon
 from conespot.localize.edge.sandwich import EdgeFit
+from conespot.localize.edge.settings import EDGE
 from conespot.localize.edge.strips import WIDTH, Strips, score_covariance
+from conespot.localize.image import Frame
 from conespot.localize.model.outline import distances, outline_problem
 from conespot.localize.model.prior import Estimate, Knowns
-from conespot.localize.model.solve import reduction, solved, spread, student_bend, student_weights
-from conespot.localize.model.view import Channel
+from conespot.localize.model.residual import follows, spread, student_weights
+from conespot.localize.model.solve import limited, reduction, solved
+from conespot.localize.model.view import Shown
+from conespot.localize.outcome import COVERED, UNCERTAIN, LocalizationFailure
 
 Array = NDArray[np.float64]
-#: bins on either side of the outline that are counted: many to find it, few to measure it
-_REACH = (2.0, 2.0, 1.0, 0.5, 0.4, 0.3, 0.3)
-_BAND = 5.0  # bins looked at on either side
-_SMALLEST = 0.02  # scatter of a strip [bins]
 
 
 @dataclass(frozen=True)
@@ -47,33 +47,29 @@ class SaturatedFit(EdgeFit):
         weights = student_weights(self.residual)
         parts = np.einsum("s,sp,sq->spq", weights, self.rows, self.rows)
         reduced = reduction(parts.sum(axis=0) + _contrast_prior(size, self.contrast_spread), size)
-        follows = max(0.3, float(np.sum(weights * student_bend(self.residual)) / np.sum(weights)))
-        scores = (weights * self.residual)[:, None] * self.rows @ reduced.T / follows
+        scores = (weights * self.residual)[:, None] * self.rows @ reduced.T / follows(weights, self.residual)
         seen = score_covariance(self.strips, scores, reduced @ parts @ reduced.T)
         known = self.prior.T @ self.prior + reduced @ _contrast_prior(size, self.contrast_spread) @ reduced.T
         return np.asarray(seen + known)
 
 
 def fit_saturated(
-    image: NDArray[np.generic], start: Estimate, knowns: Knowns, *, side: int, tied: bool = False
-) -> SaturatedFit | None:
+    frame: Frame, start: Estimate, knowns: Knowns, *, side: int, tied: bool = False
+) -> SaturatedFit | LocalizationFailure:
     """Fit the pose to which bins of `side` x `side` px are clipped.
 
-    With `tied` the axis stays on the RCM. None if too little of the outlines is in the frame or the equations are
-    singular.
+    With `tied` the axis stays on the RCM.
     """
     nominal, estimate = start.scene, start
-    roll = len(nominal.spotlights) > 1
-    pose_size = 6 if roll else 5
-    size = pose_size + len(knowns.free)
+    size = start.pose_size + len(knowns.free)
     used = replace(knowns, rcm_sigma_mm=0.0) if tied else knowns
-    ribbon = Ribbon.along(image, estimate, side=side, inner=_BAND, outer=_BAND)
+    ribbon = Ribbon.along(frame, estimate, side=side, inner=EDGE.saturated_band, outer=EDGE.saturated_band)
     if ribbon is None:
-        return None
+        return LocalizationFailure(COVERED)
     strips = ribbon.strips
     clipped = np.mean([np.where(c.clipped, 1.0, np.where(c.usable, 0.0, 0.5)) for c in ribbon.shown], axis=0)
-    problem = outline_problem(ribbon.pixels, ribbon.spots, float(side), nominal, used, roll=roll)
-    normal = _normals(ribbon, estimate, roll=roll)
+    problem = outline_problem(ribbon.pixels, ribbon.spots, float(side), nominal, used)
+    normal = _normals(ribbon, estimate)
     told = [_share(c, ribbon, normal) for c in ribbon.shown]
     share, uncertain = np.array([t[0] for t in told]), float(np.mean([t[1] for t in told]))
     beyond = np.mean([_reach_beyond(normal, s) for s in share], axis=0) / side
@@ -81,7 +77,7 @@ def fit_saturated(
     rise = rise / (2.0 * math.log(1.5) * side)
     information, pj, step = np.eye(size), np.zeros((0, size)), np.zeros(size)
     rows, residual, contrast = np.zeros((strips.count, size + 1)), np.zeros(strips.count), 0.0
-    for reach in _REACH:
+    for reach in EDGE.reach:
         distance, jacobian, pr, pj = problem(estimate)
         away = distance - beyond - contrast * rise
         counted = (np.abs(away) < reach).astype(float)
@@ -89,7 +85,7 @@ def fit_saturated(
         columns = np.concatenate([-jacobian.T, rise[None], displaced[None]])
         # a strip weighs as much as it has bins that count
         means = strips.sums(columns * counted) / np.sqrt(np.maximum(strips.sums(counted), 1.0))
-        scatter = max(spread(means[-1][means[-1] != 0.0]), _SMALLEST)
+        scatter = max(spread(means[-1][means[-1] != 0.0]), EDGE.smallest_scatter)
         rows, residual = means[:-1].T / scatter, means[-1] / scatter
         weights = student_weights(residual)
         whole = (rows * weights[:, None]).T @ rows + _contrast_prior(size, uncertain)
@@ -99,10 +95,10 @@ def fit_saturated(
         information = reduced @ whole @ reduced.T + pj.T @ pj
         found = solved(information, reduced @ slope - pj.T @ pr)
         if found is None:
-            return None
-        step = found / max(1.0, float(np.max(np.abs(found[:3]))) / 0.5, float(np.max(np.abs(found[3:5]))) / 0.05)
+            return LocalizationFailure(UNCERTAIN)
+        step = limited(found, EDGE.saturated_step_mm)
         contrast += float(np.clip((slope[size] - whole[size, :size] @ step) / whole[size, size], -1.0, 1.0))
-        estimate = estimate.moved(step, pose_size, knowns.free)
+        estimate = estimate.moved(step, knowns.free)
     return SaturatedFit(estimate, information, pj, step, ribbon.covered, strips, rows, residual, uncertain)
 
 
@@ -113,15 +109,15 @@ def _contrast_prior(size: int, sigma: float) -> Array:
     return prior
 
 
-def _share(shown: Channel, ribbon: Ribbon, normal: Array) -> tuple[float, float]:
+def _share(shown: Shown, ribbon: Ribbon, normal: Array) -> tuple[float, float]:
     """Which share of a pixel the beam covers when the pixel clips, and the spread of its logarithm.
 
     The edge leaves pixels between dark and white in a seam as wide as it moves from covering a tenth of that share to
     covering it: their number tells.
     """
-    outside = shown.usable & (ribbon.strips.offset > 2.0)
+    outside = shown.usable & (ribbon.strips.offset > EDGE.seam)
     dark = float(np.median(shown.signal[outside])) if outside.any() else 0.0
-    seam = shown.usable & (shown.signal > dark + 0.1 * (1.0 - dark)) & (np.abs(ribbon.strips.offset) < 2.0)
+    seam = shown.usable & (shown.signal > dark + 0.1 * (1.0 - dark)) & (np.abs(ribbon.strips.offset) < EDGE.seam)
     number = float(np.count_nonzero(seam))
     shares = np.geomspace(0.003, 0.9, 40)
     some = normal[:, :: max(1, normal.shape[1] // 200)]
@@ -130,11 +126,11 @@ def _share(shown: Channel, ribbon: Ribbon, normal: Array) -> tuple[float, float]
     return float(np.interp(width, widths, shares)), 1.0 / math.sqrt(number + 1.0)
 
 
-def _normals(ribbon: Ribbon, estimate: Estimate, *, roll: bool) -> Array:
+def _normals(ribbon: Ribbon, estimate: Estimate) -> Array:
     """The edge's normal at each bin, smaller component first, without signs `[2, N]`."""
     sides = [
-        distances(ribbon.pixels + shift, ribbon.spots, estimate, roll=roll)[0]
-        - distances(ribbon.pixels - shift, ribbon.spots, estimate, roll=roll)[0]
+        distances(ribbon.pixels + shift, ribbon.spots, estimate)[0]
+        - distances(ribbon.pixels - shift, ribbon.spots, estimate)[0]
         for shift in np.eye(2)
     ]
     slope = np.abs(np.stack(sides))

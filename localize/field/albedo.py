@@ -14,17 +14,16 @@ from numpy.typing import NDArray
 from scipy.linalg import cho_factor, cho_solve
 from scipy.linalg.lapack import dtrtri
 
+from conespot.localize.field.settings import FIELD
+
 Array = NDArray[np.float64]
-_EXPONENT, _KNEE = 2.6, 8.0
-#: amplitudes of the power spectrum between a uniform fundus and an optic disc
-_AMPLITUDE_RANGE = (1e-10, 1.0)
-#: octaves of the wave number, the first up to 1/4 mm, the last from 16 per mm
+#: octaves of the wave number, the first up to 1/4 mm, as wide as a window, the last from 16 per mm, the finest mode
 _FIRST_OCTAVE, _OCTAVES = -2, 8
-_SHARED = 4.0  # what the next finer octave says of an octave's amplitude, in modes
-#: amplitudes to start from, of a fundus and of what a reference leaves of it
-FUNDUS, KNOWN = np.full(_OCTAVES, 0.0025), np.full(_OCTAVES, 1e-5)
-_MOST, _BINS_A_MODE = 24, 8  # modes a side: a finer wave costs more than it tells
-_MEAN_VARIANCE = 100.0  # of the mean, which nothing restricts
+
+
+def even(amplitude: float) -> Array:
+    """The same amplitude of the power spectrum in every octave."""
+    return np.full(_OCTAVES, amplitude)
 
 
 @dataclass(frozen=True)
@@ -41,12 +40,12 @@ class Modes:
     @classmethod
     def over(cls, height: int, width: int, bin_mm: float) -> Modes:
         """Modes of a window of bins of `bin_mm` [mm]."""
-        ny, nx = (max(2, min(_MOST, side // _BINS_A_MODE)) for side in (height, width))
+        ny, nx = (max(2, min(FIELD.most_modes, side // FIELD.bins_a_mode)) for side in (height, width))
         twice = [_cosines(2 * n, size) for n, size in ((ny, height), (nx, width))]
         sides = (height * bin_mm, width * bin_mm)
         k = np.hypot(np.arange(ny)[:, None] / (2.0 * sides[0]), np.arange(nx) / (2.0 * sides[1])).ravel()
         k[0] = 1.0
-        spectrum = k**-_EXPONENT / (1.0 + (k / _KNEE) ** 2) / (sides[0] * sides[1])
+        spectrum = k**-FIELD.exponent / (1.0 + (k / FIELD.knee) ** 2) / (sides[0] * sides[1])
         norm_y, norm_x = _norms(ny), _norms(nx)
         octave = np.clip(np.floor(np.log2(k)).astype(np.intp) - _FIRST_OCTAVE, 0, _OCTAVES - 1)
         along_y, along_x = norm_y[:, None] * twice[0][:ny], norm_x[:, None] * twice[1][:nx]
@@ -55,7 +54,7 @@ class Modes:
     def precision(self, amplitudes: Array) -> Array:
         """Prior precision of each mode `[ny nx]`."""
         variance = amplitudes[self.octave] * self.spectrum
-        variance[0] = _MEAN_VARIANCE
+        variance[0] = FIELD.mean_variance
         return 1.0 / variance
 
     def field(self, coefficients: Array) -> Array:
@@ -94,10 +93,10 @@ class Modes:
         found = amplitudes.copy()
         finer = float(np.sum(power) / max(float(np.sum(determined)), 1.0))
         for octave in reversed(range(_OCTAVES)):
-            finer = float((power[octave] + _SHARED * finer) / (determined[octave] + _SHARED))
+            finer = float((power[octave] + FIELD.shared * finer) / (determined[octave] + FIELD.shared))
             found[octave] = finer
         # the fixed point is slow where there is nothing to find
-        return np.clip(found * np.minimum(1.0, found / amplitudes), *_AMPLITUDE_RANGE)
+        return np.clip(found * np.minimum(1.0, found / amplitudes), *FIELD.amplitudes)
 
 
 @dataclass(frozen=True)

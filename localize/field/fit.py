@@ -5,27 +5,23 @@ Every spotlight has a window of its own, with an albedo of its own; pose and gai
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
-from conespot.localize.edge.sandwich import SETTLED_SIGMAS
-from conespot.localize.field.albedo import FUNDUS, KNOWN, Modes
+from conespot.localize.field.albedo import Modes
 from conespot.localize.field.piece import Piece
+from conespot.localize.field.settings import FIELD, Level
+from conespot.localize.image import Frame, Reference
 from conespot.localize.model.noise import NoiseModel
 from conespot.localize.model.prior import Estimate, Knowns, prior_rows
-from conespot.localize.model.solve import inverse
-from conespot.localize.model.view import Channel, Grid, Unlit, Window, shown_in, visible
+from conespot.localize.model.solve import STEP, inverse, limited
+from conespot.localize.model.view import Bins, Shown, Window, log_albedo, visible
+from conespot.localize.outcome import COVERED, UNCERTAIN, LocalizationFailure
 
 Array = NDArray[np.float64]
-_MARGIN = 0.15  # of a patch's size, seen around it: where the light ends, and the albedo there
-_LONGEST_STEP_MM = 0.15
-_DONE_SIGMAS = 0.2  # a step this short ends the iterations
-_TIED_MM = 2e-3
-#: an albedo with vessels is no Gaussian field: on fundus images, in green and at 850 nm, the squared errors of the tip
-#: were this much larger, with the RCM and without, at 1000 and 5000 px
-_NOT_GAUSSIAN = 1.7
 
 
 @dataclass(frozen=True)
@@ -42,79 +38,66 @@ class FieldFit:
     lit_share: float  #: share of the predicted patches that the frame shows and that is not clipped
 
 
+def fit_patch(
+    frame: Frame, start: Estimate, knowns: Knowns, noise: NoiseModel, reference: Reference | None
+) -> FieldFit | LocalizationFailure:
+    """The fit, coarse to fine, or why there is none."""
+    fit: FieldFit | None = None
+    for level in FIELD.levels:
+        found = fit_field(frame, start, fit, knowns, noise, reference, level)
+        if isinstance(found, LocalizationFailure):
+            # what starts inside the frame and leaves it has run off
+            return found if fit is None else LocalizationFailure(UNCERTAIN)
+        fit, start = found, found.estimate
+    assert fit is not None
+    return fit
+
+
 def fit_field(
-    image: NDArray[np.generic],
+    frame: Frame,
     start: Estimate,
     before: FieldFit | None,
     knowns: Knowns,
     noise: NoiseModel,
-    *,
-    bins: int,
-    iterations: int,
-    tied: int = 0,
-    unlit: Unlit | None = None,
-) -> FieldFit | None:
-    """Fit pose, gain and albedo to windows at most `bins` bins across each patch, from `start`.
+    reference: Reference | None,
+    level: Level,
+) -> FieldFit | LocalizationFailure:
+    """Fit pose, gain and albedo to windows as fine as the `level` says, from `start`.
 
-    The first `tied` iterations keep the axis on the RCM, so that a poor start cannot run off along the soft directions
-    of a free fit. `before` is a coarser fit, to start its albedo and gain from. None if the patches leave the frame or
-    the equations are singular.
+    The first iterations may keep the axis on the RCM, so that a poor start cannot run off along the soft directions of
+    a free fit. `before` is a coarser fit, to start its albedo and gain from.
     """
-    estimate, nominal = start, start.scene
-    roll = len(nominal.spotlights) > 1
-    pose_size = 6 if roll else 5
-    size = pose_size + len(knowns.free)
-    windows: list[tuple[list[Channel], Grid, Modes]] = []
-    for k in range(len(nominal.spotlights)):
-        at = Window.around(estimate, k, bins, _MARGIN)
-        if at is None:
-            continue
-        grid = Grid(at, estimate, knowns, k)
-        basis = Modes.over(at.height, at.width, nominal.camera.pixel_pitch * at.side)
-        windows.append((shown_in(image, nominal, at, unlit), grid, basis))
-    if not windows:
-        return None
-    # the channel least clipped leads: its light is measured, the others tell its albedo
-    usable = np.sum([[np.count_nonzero(plane.usable) for plane in shown] for shown, _, _ in windows], axis=0)
-    lead = int(np.argmax(usable))
-    pieces = [Piece(shown, lead, grid, basis, noise) for shown, grid, basis in windows]
-    lights = [piece.grid.spotlight(estimate, roll=roll) for piece in pieces]
+    nominal, estimate = start.scene, start
+    size = start.pose_size + len(knowns.free)
+    lead, pieces = _pieces(frame, start, knowns, noise, reference, level.bins)
+    if not pieces:
+        return LocalizationFailure(COVERED)
+    lights = [piece.bins.spotlight(estimate) for piece in pieces]
     gain = float(np.median([piece.begin(light) for piece, (light, _) in zip(pieces, lights, strict=True)]))
     if before is not None and before.lead == lead and len(before.pieces) == len(pieces):
         gain = before.gain
         for piece, coarse in zip(pieces, before.pieces, strict=True):
             piece.resume(coarse)
-    else:
-        for piece in pieces:
-            piece.amplitudes = FUNDUS if unlit is None else KNOWN
     settled, prior, information = False, np.zeros((size, size)), np.eye(size + 1)
-    for count in range(iterations):
-        tie = replace(knowns, rcm_sigma_mm=_TIED_MM) if count < tied else knowns
-        residuals, rows = prior_rows(estimate, nominal, tie, pose_size)
-        prior = rows.T @ rows
-        information, gradient = np.zeros((size + 1, size + 1)), np.zeros(size + 1)
-        information[:size, :size], gradient[:size] = prior, -rows.T @ residuals
+    for count in range(level.iterations):
         if count:
-            lights = [piece.grid.spotlight(estimate, roll=roll) for piece in pieces]
-        if not all(np.isfinite(light).all() and np.isfinite(rows).all() for light, rows in lights):
-            return None
-        for piece, light in zip(pieces, lights, strict=True):
-            part, slope = piece.linearize(*light, gain)
-            information += part
-            gradient += slope
-        covariance = inverse(information)
-        step = covariance @ gradient
-        if not np.all(np.isfinite(step)):
-            return None
-        step /= max(1.0, float(np.max(np.abs(step[:3]))) / _LONGEST_STEP_MM, float(np.max(np.abs(step[3:5]))) / 0.05)
+            lights = [piece.bins.spotlight(estimate) for piece in pieces]
+        tie = replace(knowns, rcm_sigma_mm=FIELD.tied_mm) if count < level.tied else knowns
+        residuals, rows = prior_rows(estimate, nominal, tie)
+        prior = rows.T @ rows
+        equations = _equations(pieces, lights, gain, prior, -rows.T @ residuals)
+        if equations is None:
+            return LocalizationFailure(UNCERTAIN)
+        information, covariance, found = equations
+        step = limited(found, FIELD.longest_step_mm)
         step[size] = np.clip(step[size], -1.0, 1.0)
-        estimate = estimate.moved(step[:size], pose_size, knowns.free)
+        estimate = estimate.moved(step[:size], knowns.free)
         gain += float(step[size])
         for piece in pieces:
             piece.move(step, covariance)
         length = float(np.sqrt(max(0.0, float(step @ information @ step))))
-        settled = length < SETTLED_SIGMAS
-        if length < _DONE_SIGMAS and count >= max(tied, 1):
+        settled = length < STEP.settled_sigmas
+        if length < FIELD.done_sigmas and count >= max(level.tied, 1):
             break
     own = information[size, :size]
     data = information[:size, :size] - np.outer(own, own) / max(information[size, size], 1e-12) - prior
@@ -123,8 +106,57 @@ def fit_field(
         tuple(pieces),
         lead,
         gain,
-        prior + data / _NOT_GAUSSIAN,
+        prior + data / FIELD.not_gaussian,
         float(np.sqrt(np.mean([piece.misfit**2 for piece in pieces]))),
         settled,
         visible(estimate) * float(np.mean([piece.unclipped() for piece in pieces])),
     )
+
+
+def _pieces(
+    frame: Frame, start: Estimate, knowns: Knowns, noise: NoiseModel, reference: Reference | None, bins: int
+) -> tuple[int, list[Piece]]:
+    """The channel whose light is measured, and a piece for every patch in the frame."""
+    scene = start.scene
+    found: list[tuple[Window, Bins, list[Shown]]] = []
+    for spotlight in range(len(scene.spotlights)):
+        at = Window.around(start, spotlight, bins, FIELD.margin)
+        if at is None:
+            continue
+        shown = Shown.each(frame, at)
+        if reference is not None:
+            told = zip(shown, *log_albedo(reference, scene, at, noise), strict=True)
+            shown = [plane.told(albedo, variance) for plane, albedo, variance in told]
+        found.append((at, Bins(at, start, knowns, spotlight), shown))
+    if not found:
+        return 0, []
+    # the channel least clipped leads: its light is measured, the others tell its albedo
+    usable = np.sum([[np.count_nonzero(plane.usable) for plane in shown] for _, _, shown in found], axis=0)
+    lead = int(np.argmax(usable))
+    amplitude = FIELD.fundus if reference is None else FIELD.known
+    pitch = scene.camera.pixel_pitch
+    return lead, [
+        Piece(shown, lead, seen, Modes.over(at.height, at.width, pitch * at.side), noise, amplitude)
+        for at, seen, shown in found
+    ]
+
+
+def _equations(
+    pieces: Sequence[Piece], lights: Sequence[tuple[Array, Array]], gain: float, prior: Array, pull: Array
+) -> tuple[Array, Array, Array] | None:
+    """Information and covariance `[P + 1, P + 1]` of pose, free quantities and gain, and the step `[P + 1]`.
+
+    `prior` `[P, P]` and its `pull` `[P]` are added to what the pieces say. None if it is singular.
+    """
+    if not all(np.isfinite(light).all() and np.isfinite(rows).all() for light, rows in lights):
+        return None
+    size = len(pull)
+    information, gradient = np.zeros((size + 1, size + 1)), np.zeros(size + 1)
+    information[:size, :size], gradient[:size] = prior, pull
+    for piece, light in zip(pieces, lights, strict=True):
+        part, slope = piece.linearize(*light, gain)
+        information += part
+        gradient += slope
+    covariance = inverse(information)
+    step = covariance @ gradient
+    return (information, covariance, step) if np.all(np.isfinite(step)) else None

@@ -6,22 +6,23 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from conespot.localize.field.albedo import FUNDUS, Modes, eliminate
+from conespot.localize.field.albedo import Modes, eliminate, even
 from conespot.localize.field.roughness import Roughness
+from conespot.localize.field.settings import FIELD
 from conespot.localize.model.noise import NoiseModel
-from conespot.localize.model.view import Channel, Grid
+from conespot.localize.model.residual import log_residuals, rms
+from conespot.localize.model.view import Bins, Shown
 
 Array = NDArray[np.float64]
-_CHROMA = 0.5  # how much of a log ratio of channels the leading one's log albedo may hold
 
 
-def _chroma(lead: Channel, others: list[Channel]) -> Array:
+def _chroma(lead: Shown, others: list[Shown]) -> Array:
     """Log ratios `[C - 1, h, w]` of the other channels to the leading one, beside their templates; 0 where unknown."""
     found = np.zeros((len(others), *lead.signal.shape))
     for plane, other in zip(found, others, strict=True):
         # a little smoother than the bins, or their noise would hide what the channels have in common
-        smooth = [cv2.GaussianBlur(channel.signal, (0, 0), 1.0) for channel in (other, lead)]
-        a, b = (np.maximum(signal, max(0.05 * float(np.median(signal)), 1e-6)) for signal in smooth)
+        smooth = [cv2.GaussianBlur(channel.signal, (0, 0), FIELD.chroma_blur) for channel in (other, lead)]
+        a, b = (np.maximum(signal, max(FIELD.chroma_darkest * float(np.median(signal)), 1e-6)) for signal in smooth)
         ratio = np.log(a / b) - other.template + lead.template
         known = lead.usable & other.usable
         plane[known] = ratio[known] - (np.median(ratio[known]) if known.any() else 0.0)
@@ -35,14 +36,14 @@ class Piece:
     it are free of the light, and what they have in common with the leader's albedo is taken off.
     """
 
-    roughness = Roughness()
-    amplitudes = FUNDUS  # of the albedo's power spectrum, by octave
-
-    def __init__(self, shown: list[Channel], lead: int, grid: Grid, basis: Modes, noise: NoiseModel) -> None:
-        """Of the channels `shown` the `lead`ing one is measured."""
-        self.grid, plane = grid, shown[lead]
+    def __init__(
+        self, shown: list[Shown], lead: int, bins: Bins, basis: Modes, noise: NoiseModel, amplitude: float
+    ) -> None:
+        """Of the channels `shown` the `lead`ing one is measured; the albedo's spectrum begins with `amplitude`."""
+        self.bins, plane = bins, shown[lead]
+        self.roughness, self.amplitudes = Roughness(FIELD.scatter), even(amplitude)  # by octave
         self._plane, self._basis, self._noise = plane, basis, noise
-        self._seen = grid.seen.reshape(plane.signal.shape)
+        self._seen = bins.seen.reshape(plane.signal.shape)
         self._usable = plane.usable & self._seen
         self._chroma = _chroma(plane, shown[:lead] + shown[lead + 1 :])
         self._albedo = np.zeros(plane.signal.shape)  # log, beside the template
@@ -52,7 +53,7 @@ class Piece:
 
     def begin(self, light: Array) -> float:
         """Take the surroundings' albedo for all there is, and tell the log gain that the brighter half then shows."""
-        plane, full, ambient = self._plane, self._full(light), self.grid.ambient.reshape(self._seen.shape)
+        plane, full, ambient = self._plane, self._full(light), self.bins.ambient.reshape(self._seen.shape)
         dark, lit = self._usable & (full <= 0.0), self._usable & (full > 0.0)
         if np.count_nonzero(dark) < 10:
             dark = np.ones_like(dark)
@@ -67,7 +68,7 @@ class Piece:
     def resume(self, coarse: Piece) -> None:
         """Take over what a coarser fit knows of the albedo."""
         self.roughness, self.amplitudes = coarse.roughness, coarse.amplitudes
-        at, old = self.grid.at, coarse.grid.at
+        at, old = self.bins.at, coarse.bins.at
         scale = at.side / old.side
         shift = [
             (new - was) / old.side + (scale - 1.0) / 2.0 for new, was in ((at.column, old.column), (at.row, old.row))
@@ -87,38 +88,33 @@ class Piece:
     def linearize(self, light: Array, rows: Array, log_gain: float) -> tuple[Array, Array]:
         """Information `[P + 1, P + 1]` and gradient `[P + 1]` of the pose and the log gain.
 
-        The grid's bins get `light` `[N]`, with its derivatives `[P, N]`.
+        The lit bins get `light` `[N]`, with its derivatives `[P, N]`.
         """
-        plane, grid = self._plane, self.grid
+        plane, bins = self._plane, self.bins
         shape, gain = plane.signal.shape, np.exp(log_gain)
         full = self._full(light)
         self._lit = full > 0.0
-        brightness = grid.ambient.reshape(shape) + gain * full
+        brightness = bins.ambient.reshape(shape) + gain * full
         model = np.exp(plane.template + self._albedo) * brightness
-        relative = plane.signal / model - 1.0
-        residual = np.where(np.abs(relative) < 0.3, relative, np.log(np.maximum(plane.signal, 0.02 * model) / model))
-        # a clipped bin says only that its light is above white
-        bound = plane.clipped & self._seen & (model < 1.0)
-        residual[bound] = np.maximum(0.0, -np.log(np.maximum(model[bound], 1e-6)))
-        use = self._usable | bound
-        sensor = self._noise.variance(model) / grid.at.side**2 / np.square(np.maximum(model, 1e-9))
+        residual, bound = log_residuals(plane, model, FIELD.linear)
+        use = self._usable | (bound & self._seen)
+        sensor = self._noise.variance(model) / bins.at.side**2 / np.square(np.maximum(model, 1e-9))
         sensor = sensor + plane.template_variance
         local = np.full(shape, self.roughness.scatter**2)
         if not self._fresh:
-            inner = self._usable & (full > 0.1 * light.max(initial=0.0))
+            inner = self._usable & (full > FIELD.lit * light.max(initial=0.0))
             self.roughness, local = self.roughness.measured(residual, sensor, use, inner)
-        whitened = np.square(residual[use]) / (sensor + local)[use]
-        self.misfit = float(np.sqrt(np.mean(np.minimum(whitened, 25.0)))) if use.any() else np.inf
+        self.misfit = rms((residual / np.sqrt(sensor + local))[use])
         size = len(rows) + 1
         jacobian = np.zeros((size + len(self._chroma), full.size))
-        share = gain / brightness.ravel()[grid.lit]
-        jacobian[: size - 1, grid.lit] = share * rows
-        jacobian[size - 1, grid.lit] = share * light
+        share = gain / brightness.ravel()[bins.lit]
+        jacobian[: size - 1, bins.lit] = share * rows
+        jacobian[size - 1, bins.lit] = share * light
         jacobian[size:] = self._chroma.reshape(len(self._chroma), full.size)
         weights = use / (sensor + self.roughness.variance(local))
         solved = eliminate(self._basis, weights, jacobian.reshape(-1, *shape), residual + self._albedo, self.amplitudes)
         self._solved = solved
-        own = solved.information[size:, size:] + np.eye(len(self._chroma)) / _CHROMA**2
+        own = solved.information[size:, size:] + np.eye(len(self._chroma)) / FIELD.chroma**2
         self._reaction = np.linalg.solve(own, solved.information[size:, :size])
         self._share = np.linalg.solve(own, solved.gradient[size:])
         return (
@@ -143,5 +139,5 @@ class Piece:
     def _full(self, light: Array) -> Array:
         """Light on all bins of the window `[h, w]`."""
         full = np.zeros(self._seen.shape)
-        full.ravel()[self.grid.lit] = light
+        full.ravel()[self.bins.lit] = light
         return full

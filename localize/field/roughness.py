@@ -12,22 +12,17 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from conespot.localize.model.solve import rest
+from conespot.localize.field.settings import FIELD
+from conespot.localize.model.residual import rest
 
 Array = NDArray[np.float64]
-_NEAR = 13  # bins a side over which the rest is measured, about a wave of the finest modes
-_BLOCK = 5  # bins a side whose mean tells how far neighbours share their rest
-_ELSEWHERE = 20.0  # bins' worth of the whole patch's rest in what is measured around one
-_LARGEST_AREA = 30.0
-#: the rest is correlated farther than the blocks tell; measured on fundus images, as the largest that costs no accuracy
-_FARTHER = 4.0
 
 
 @dataclass(frozen=True)
 class Roughness:
     """The log albedo beyond the modes in one channel."""
 
-    scatter: float = 0.1  #: rms where nothing special is
+    scatter: float = FIELD.scatter  #: rms where nothing special is
     area: float = 1.0  #: bins that share their rest
 
     def measured(
@@ -37,28 +32,28 @@ class Roughness:
 
         What is left of longer waves belongs to the modes, and is taken off before anything is measured.
         """
-        size = (_NEAR, _NEAR)
+        size = (FIELD.near, FIELD.near)
         trust = use / (sensor + self.scatter**2)
         high = residual - cv2.blur(trust * residual, size) / np.maximum(cv2.blur(trust, size), 1e-9)
         high = np.where(use, high, 0.0)
         scatter = rest(high[lit], sensor[lit], self.scatter) if np.count_nonzero(lit) > 30 else self.scatter
-        excess = np.where(use, np.minimum(np.square(high), 1.0) - sensor, 0.0)
-        near = _NEAR**2 * cv2.blur(np.stack([excess, use.astype(float)], axis=2), size)
-        local = (near[..., 0] + _ELSEWHERE * scatter**2) / (near[..., 1] + _ELSEWHERE)
-        local = np.maximum(local, 0.5 * scatter**2)
+        excess = np.where(use, np.minimum(np.square(high), FIELD.largest_excess) - sensor, 0.0)
+        near = FIELD.near**2 * cv2.blur(np.stack([excess, use.astype(float)], axis=2), size)
+        local = (near[..., 0] + FIELD.elsewhere * scatter**2) / (near[..., 1] + FIELD.elsewhere)
+        local = np.maximum(local, FIELD.least_local * scatter**2)
         return Roughness(scatter, _shared(np.where(lit, high / np.sqrt(sensor + local), 0.0), lit)), local
 
     def variance(self, local: Array) -> Array:
         """What bins with the `local` variance of the rest count for, as if none shared it with a neighbour."""
-        return local * self.area * _FARTHER
+        return local * self.area * FIELD.farther
 
 
 def _shared(residuals: Array, lit: NDArray[np.bool_]) -> float:
     """Variance of means over blocks of whitened residuals, times the block's area, over the bins' own [bins]."""
-    residuals = np.clip(residuals, -4.0, 4.0)
-    block = (_BLOCK, _BLOCK)
+    residuals = np.clip(residuals, -FIELD.largest_shared, FIELD.largest_shared)
+    block = (FIELD.block, FIELD.block)
     means = cv2.blur(residuals, block)[cv2.blur(lit.astype(float), block) > 0.99]
-    if len(means) < 2 * _BLOCK**2:
+    if len(means) < 2 * FIELD.block**2:
         return 1.0
     single = float(np.var(residuals[lit]))
-    return float(np.clip(_BLOCK**2 * np.var(means) / max(single, 1e-12), 1.0, _LARGEST_AREA))
+    return float(np.clip(FIELD.block**2 * np.var(means) / max(single, 1e-12), 1.0, FIELD.largest_area))

@@ -122,16 +122,16 @@ def light(
     scene: Scene,
     profile: Profile,
     *,
-    roll: bool = False,
+    pose_size: int = 5,
     changes: Sequence[tuple[Profile, Profile, float]] = (),
 ) -> Light:
     """The spotlights' irradiance on what `sight` sees: the cones' pixel means times cosine over distance squared.
 
-    With `roll` the sixth pose parameter gets its row of the Jacobian. Each of the `changes` gets one too: the profile
-    at a little more and a little less of some quantity, and how much lies between them.
+    The Jacobian has a row for each of `pose_size` pose parameters, the sixth being the roll, and one for each of the
+    `changes`: the profile at a little more and a little less of some quantity, and how much lies between them.
     """
     axes = spotlight_axes(pose, scene.spotlights)
-    basis = rotation_basis(pose.axis)[: 3 if roll else 2]
+    basis = rotation_basis(pose.axis)[: pose_size - 3]
     to = sight.points - pose.apex
     d2 = np.einsum("ij,ij->i", to, to)
     d = np.sqrt(d2)

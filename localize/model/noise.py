@@ -1,4 +1,4 @@
-"""From pixel values back to light, and how noisy that light is.
+"""How noisy light is, once pixel values have been turned back to it (`localize.image`).
 
 Inside the estimators a signal of 1 is white: the largest value a pixel can take. Everything a sensor does is behind
 `NoiseModel`, so a sensor with electrons only has to say how its variance grows with the signal.
@@ -7,11 +7,10 @@ Inside the estimators a signal of 1 is white: the largest value a pixel can take
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import lru_cache
 from typing import Protocol
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
 from conespot.scene.document import InputError
 from conespot.scene.emva import Emva
@@ -64,44 +63,6 @@ def noise_of(scene: Scene) -> NoiseModel:
         levels = sensor.full_scale
         return SensorNoise(levels=levels, electrons=levels / sensor.gain, read=sensor.read_noise)
     return SensorNoise(levels=sensor.full_scale, srgb=isinstance(sensor, Srgb8))
-
-
-def linear_light(pixels: NDArray[np.generic], scene: Scene) -> tuple[NDArray[np.float32], NDArray[np.bool_]]:
-    """Signals [white] of pixel values of any shape, and which of them are clipped and only bounds.
-
-    uint8: 255 is white; uint16: the sensor's full scale; float: 1.0. An sRGB sensor's transfer is undone, a camera's
-    black level taken off. Raises InputError for any other type.
-    """
-    if isinstance(scene.sensor, Emva):
-        sensor = scene.sensor
-        full = 255.0 if pixels.dtype == np.uint8 else sensor.full_scale if pixels.dtype == np.uint16 else 1.0
-        value = pixels.astype(np.float32) / np.float32(full)
-        black = sensor.black_level / sensor.full_scale
-        # a pixel near the full well is as good as clipped: its noise is cut off on one side
-        limit = black + 0.98 * min(1.0 - black, sensor.saturation * sensor.gain / sensor.full_scale)
-        return value - np.float32(black), value >= limit
-    srgb = isinstance(scene.sensor, Srgb8)
-    if pixels.dtype == np.uint8 or pixels.dtype == np.uint16:
-        full = 255 if pixels.dtype == np.uint8 else min(scene.sensor.full_scale, 65535)
-        table = _table(full, 256 if pixels.dtype == np.uint8 else 65536, srgb)
-        return table[pixels], np.asarray(pixels, np.uint16) >= full
-    if np.issubdtype(pixels.dtype, np.floating):
-        signal = pixels.astype(np.float32)
-        clipped = signal >= 1.0
-        return (_srgb_decode(signal).astype(np.float32) if srgb else signal), clipped
-    raise InputError(f"an image must be uint8, uint16 or float, not {pixels.dtype}")
-
-
-@lru_cache(maxsize=8)
-def _table(full: int, size: int, srgb: bool) -> NDArray[np.float32]:
-    code = np.minimum(np.arange(size) / full, 1.0)
-    return (_srgb_decode(code) if srgb else code).astype(np.float32)
-
-
-def _srgb_decode(code: ArrayLike) -> Array:
-    """IEC 61966-2-1."""
-    c = np.asarray(code, float)
-    return np.where(c <= 0.04045, c / 12.92, ((np.maximum(c, 0.04045) + 0.055) / 1.055) ** 2.4)
 
 
 def _srgb_slope(signal: Array) -> Array:

@@ -16,7 +16,7 @@ Array = NDArray[np.float64]
 _STEP = {"eye_radius": 1e-4, "camera_height": 1e-4}
 
 
-def distances(pixels: Array, spots: NDArray[np.intp], estimate: Estimate, *, roll: bool) -> tuple[Array, Array, Array]:
+def distances(pixels: Array, spots: NDArray[np.intp], estimate: Estimate) -> tuple[Array, Array, Array]:
     """Distances `[N]` [px] of pixels `[N, 2]` from the outlines of their `spots` `[N]`, positive outside.
 
     Also their derivatives by the pose `[N, 5 or 6]` and by the half angle `[N]`. The distance is the residual angle
@@ -37,21 +37,20 @@ def distances(pixels: Array, spots: NDArray[np.intp], estimate: Estimate, *, rol
     across = -aside / (d * s)[:, None]  # gradient of the angle over the surface point
     gx, gy = (np.einsum("ij,ij->i", across, along) for along in (sight.along_x, sight.along_y))
     slope = np.hypot(gx, gy)
-    basis = rotation_basis(pose.axis)[: 3 if roll else 2]
+    basis = rotation_basis(pose.axis)[: estimate.pose_size - 3]
     turns = [-np.einsum("ij,ij->i", to, np.cross(vector, each)[spots]) / s for vector in basis]
     jacobian = np.column_stack([-across, *turns]) / slope[:, None]
     return residual / slope, jacobian, -1.0 / slope
 
 
 def outline_problem(
-    pixels: Array, spots: NDArray[np.intp], sigma: Array | float, scene: Scene, knowns: Knowns, *, roll: bool
+    pixels: Array, spots: NDArray[np.intp], sigma: Array | float, scene: Scene, knowns: Knowns
 ) -> Problem:
     """The least-squares problem of edge points `[N, 2]` [px] with standard deviations `sigma` [px] across the edge."""
     weight = 1.0 / np.broadcast_to(np.asarray(sigma, float), (len(pixels),))
-    size = 6 if roll else 5
 
     def problem(estimate: Estimate) -> tuple[Array, Array, Array, Array]:
-        r, jac, by_angle = distances(pixels, spots, estimate, roll=roll)
+        r, jac, by_angle = distances(pixels, spots, estimate)
         columns = [jac]
         for name in knowns.free:
             if name in BEAM:
@@ -60,13 +59,11 @@ def outline_problem(
                 continue
             here, step = value(estimate.scene, name), _STEP[name]
             sides = [
-                distances(
-                    pixels, spots, Estimate(estimate.pose, with_value(estimate.scene, name, here + s)), roll=roll
-                )[0]
+                distances(pixels, spots, Estimate(estimate.pose, with_value(estimate.scene, name, here + s)))[0]
                 for s in (step, -step)
             ]
             columns.append(((sides[0] - sides[1]) / (2.0 * step))[:, None])
-        pr, pj = prior_rows(estimate, scene, knowns, size)
+        pr, pj = prior_rows(estimate, scene, knowns)
         return r * weight, np.hstack(columns) * weight[:, None], pr, pj
 
     return problem
@@ -90,21 +87,18 @@ def fit_outline(
     """
     points = np.asarray(pixels, float)
     which = np.zeros(len(points), np.intp) if spots is None else spots
-    roll = len(scene.spotlights) > 1
     pose = start if start is not None else start_pose(points, which, scene)
     if pose is None or len(points) < 6:
         return None
     first = Estimate(pose, scene)
     if start is None:
         exact = Knowns(rcm_sigma_mm=1e-3)
-        tied = minimize(
-            outline_problem(points, which, 1.0, scene, exact, roll=roll), first, 6 if roll else 5, (), robust=robust
-        )
+        tied = minimize(outline_problem(points, which, 1.0, scene, exact), first, (), robust=robust)
         if tied is None:
             return None
         first = tied.estimate
-    problem = outline_problem(points, which, sigma, scene, knowns, roll=roll)
-    return minimize(problem, first, 6 if roll else 5, knowns.free, robust=robust, tolerance=1e-11)
+    problem = outline_problem(points, which, sigma, scene, knowns)
+    return minimize(problem, first, knowns.free, robust=robust, tolerance=1e-11)
 
 
 def start_pose(pixels: Array, spots: NDArray[np.intp], scene: Scene) -> Pose | None:

@@ -96,6 +96,11 @@ class Estimate:
     scene: Scene
 
     @property
+    def pose_size(self) -> int:
+        """How many parameters the pose has: tip and axis, and with several spotlights the roll."""
+        return 6 if len(self.scene.spotlights) > 1 else 5
+
+    @property
     def profile(self) -> Profile:
         """The beam's profile."""
         return Profile.of(self.scene.beam)
@@ -109,12 +114,12 @@ class Estimate:
             found.append((more, less, 2.0 * step))
         return found
 
-    def moved(self, step: Array, pose_size: int, free: tuple[str, ...]) -> Estimate:
+    def moved(self, step: Array, free: tuple[str, ...]) -> Estimate:
         """The estimate after `step`: pose parameters first, then the free quantities."""
         scene = self.scene
-        for name, delta in zip(free, step[pose_size:], strict=True):
+        for name, delta in zip(free, step[self.pose_size :], strict=True):
             scene = with_value(scene, name, value(scene, name) + float(delta))
-        return Estimate(moved(self.pose, step[:pose_size]), scene)
+        return Estimate(moved(self.pose, step[: self.pose_size]), scene)
 
 
 def rcm_miss(pose: Pose, scene: Scene) -> Array:
@@ -124,9 +129,9 @@ def rcm_miss(pose: Pose, scene: Scene) -> Array:
     return np.array([u @ offset, v @ offset])
 
 
-def prior_rows(estimate: Estimate, nominal: Scene, knowns: Knowns, pose_size: int) -> tuple[Array, Array]:
+def prior_rows(estimate: Estimate, nominal: Scene, knowns: Knowns) -> tuple[Array, Array]:
     """Whitened residuals `[Q]` and Jacobian `[Q, P]` of what is known, for P = pose parameters and free quantities."""
-    free = knowns.free
+    free, pose_size = knowns.free, estimate.pose_size
     size = pose_size + len(free)
     residuals: list[float] = []
     rows: list[Array] = []

@@ -1,4 +1,4 @@
-"""Robust least squares: Gauss-Newton with Levenberg's damping and Student-t weights."""
+"""Least squares: normal equations, how far a step may go, and Gauss-Newton with Levenberg's damping."""
 
 from __future__ import annotations
 
@@ -9,37 +9,26 @@ import numpy as np
 from numpy.typing import NDArray
 
 from conespot.localize.model.prior import Estimate
+from conespot.localize.model.residual import student_cost, student_weights
 
 Array = NDArray[np.float64]
-#: degrees of freedom of the Student-t distribution residuals are taken to follow
-STUDENT = 4.0
 
 
-def student_weights(residuals: Array) -> Array:
-    """Weights of iteratively reweighted least squares for whitened residuals that follow Student's t."""
-    return np.asarray((STUDENT + 1.0) / (STUDENT + np.square(residuals)))
+@dataclass(frozen=True)
+class StepSettings:
+    """Tuned numbers of every fit's steps."""
+
+    settled_sigmas: float = 1.0
+    longest_turn: float = 0.05
 
 
-def student_bend(residuals: Array) -> Array:
-    """Slope of the influence of whitened residuals over their weight: 1 for small ones, -1 for gross errors."""
-    square = np.square(residuals)
-    return np.asarray((STUDENT - square) / (STUDENT + square))
+STEP = StepSettings()
 
 
-def spread(residuals: Array) -> float:
-    """Robust standard deviation: 1.4826 times the median absolute value."""
-    return 1.4826 * float(np.median(np.abs(residuals))) if len(residuals) else 0.0
-
-
-_REST = (1e-4, 0.3)
-
-
-def rest(residuals: Array, variances: Array, before: float) -> float:
-    """What residuals scatter beyond the sensor's `variances`, one step from `before`: albedo nothing else explains."""
-    whole = variances + before**2
-    ratio = spread(residuals / np.sqrt(whole)) ** 2
-    found = before**2 + (ratio - 1.0) * float(np.median(whole))
-    return float(np.sqrt(np.clip(found, _REST[0] ** 2, _REST[1] ** 2)))
+def limited(step: Array, longest_mm: float) -> Array:
+    """A step, shorter where it moves the tip by more than `longest_mm` along a coordinate or turns the axis too far."""
+    tip, axis = float(np.max(np.abs(step[:3]))), float(np.max(np.abs(step[3:5])))
+    return np.asarray(step / max(1.0, tip / longest_mm, axis / STEP.longest_turn))
 
 
 def reduction(information: Array, size: int) -> Array:
@@ -85,7 +74,6 @@ Problem = Callable[[Estimate], tuple[Array, Array, Array, Array]]
 def minimize(
     problem: Problem,
     start: Estimate,
-    pose_size: int,
     free: tuple[str, ...],
     *,
     robust: bool = True,
@@ -93,7 +81,7 @@ def minimize(
     tolerance: float = 1e-9,
 ) -> Solution | None:
     """The estimate that minimizes the (Student-t) cost; None when the problem is singular."""
-    estimate, damping = start, 1e-6
+    estimate, damping, pose_size = start, 1e-6, start.pose_size
     r, jac, pr, pj = problem(estimate)
     cost = _cost(r, pr, robust)
     converged = False
@@ -113,7 +101,7 @@ def minimize(
             if not np.all(np.isfinite(step)) or float(np.linalg.norm(step[3:pose_size])) > 1.0:
                 damping = max(damping * 10.0, 1e-3)
                 continue
-            trial = estimate.moved(step, pose_size, free)
+            trial = estimate.moved(step, free)
             new = problem(trial)
             new_cost = _cost(new[0], new[2], robust)
             if new_cost <= cost * (1.0 + 1e-12) + 1e-300:
@@ -133,5 +121,4 @@ def minimize(
 
 
 def _cost(r: Array, pr: Array, robust: bool) -> float:
-    data = (STUDENT + 1.0) * np.log1p(np.square(r) / STUDENT) if robust else np.square(r)
-    return float(np.sum(data) + np.sum(np.square(pr)))
+    return (student_cost(r) if robust else float(np.sum(np.square(r)))) + float(np.sum(np.square(pr)))

@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from conespot.localize.image import Frame, Reference
 from conespot.localize.model.forward import Sight, ambient_irradiance, light, light_by_surface, look, window
-from conespot.localize.model.noise import NoiseModel, linear_light
+from conespot.localize.model.noise import NoiseModel
 from conespot.localize.model.occlusion import covered
 from conespot.localize.model.prior import BEAM, Estimate, Knowns, value, with_value
 from conespot.scene.scene import Scene
@@ -17,6 +18,23 @@ from conespot.scene.spotlights import spotlight_axes
 
 Array = NDArray[np.float64]
 _STEP = 1e-3  # of eye radius and camera height [mm], for differences
+_POINTS = 96  # of an outline
+
+
+@dataclass(frozen=True)
+class ViewSettings:
+    """Tuned numbers of windows and references."""
+
+    fewest_bins: int = 6
+    reach: int = 4
+    detail: float = 1e-4
+    smoothing: float = 0.5
+    least_blur: float = 0.3
+    widest_blur: float = 2.5
+    darkest: float = 0.1
+
+
+VIEW = ViewSettings()
 
 
 @dataclass(frozen=True)
@@ -41,13 +59,19 @@ class Window:
         edge = np.array(scene.camera.shape[::-1]) // side
         low = np.clip(np.floor((low - margin * size) / side), 0, edge).astype(int)
         high = np.clip(np.ceil((high + margin * size) / side), 0, edge).astype(int)
-        if np.any(high - low < 6):
+        if np.any(high - low < VIEW.fewest_bins):
             return None
         return cls(int(low[1]) * side, int(low[0]) * side, int(high[1] - low[1]), int(high[0] - low[0]), side)
 
-    def cut(self, image: NDArray[np.generic]) -> NDArray[np.generic]:
-        """The window's pixels of a full frame."""
-        return image[self.row : self.row + self.height * self.side, self.column : self.column + self.width * self.side]
+    @property
+    def pixels(self) -> Array:
+        """The bins' centres `[h * w, 2]` [px]."""
+        return window(self.row, self.column, self.height, self.width, self.side)
+
+    def light(self, frame: Frame) -> tuple[NDArray[np.float32], NDArray[np.bool_]]:
+        """The light of the window's pixels [white], and which of them are clipped: `[rows, columns, C]` each."""
+        rows = slice(self.row, self.row + self.height * self.side)
+        return frame.light(rows, slice(self.column, self.column + self.width * self.side))
 
     def binned(self, pixels: NDArray[np.float32]) -> Array:
         """Means over the bins `[h, w]` of the window's pixels."""
@@ -56,7 +80,7 @@ class Window:
         return cv2.resize(pixels, (self.width, self.height), interpolation=cv2.INTER_AREA).astype(float)
 
 
-def outline(estimate: Estimate, spotlight: int, points: int = 96) -> Array:
+def outline(estimate: Estimate, spotlight: int, points: int = _POINTS) -> Array:
     """Pixels `[N, 2]` [px] of a spotlight's outline, in the frame or beyond."""
     pixels = estimate.scene.camera.project(estimate.scene.outline(estimate.pose, spotlight, points))
     return np.asarray(pixels[np.all(np.isfinite(pixels), axis=1)])
@@ -66,7 +90,7 @@ def _inside(pixels: Array, scene: Scene) -> NDArray[np.bool_]:
     return np.asarray(np.all((pixels > 0.0) & (pixels < scene.camera.shape[::-1]), axis=1))
 
 
-def outlines(estimate: Estimate, points: int = 96) -> Array:
+def outlines(estimate: Estimate, points: int = _POINTS) -> Array:
     """Pixels `[N, 2]` [px] of all spotlights' outlines that are in the frame."""
     pixels = np.concatenate([outline(estimate, k, points) for k in range(len(estimate.scene.spotlights))])
     return np.asarray(pixels[_inside(pixels, estimate.scene)])
@@ -74,13 +98,12 @@ def outlines(estimate: Estimate, points: int = 96) -> Array:
 
 def visible(estimate: Estimate) -> float:
     """Share of the spotlights' outlines that is in the frame."""
-    count = len(estimate.scene.spotlights)
-    return len(outlines(estimate)) / (96 * count)
+    return len(outlines(estimate)) / (_POINTS * len(estimate.scene.spotlights))
 
 
 @dataclass(frozen=True)
-class Channel:
-    """What one channel of the image shows in a window."""
+class Shown:
+    """What one channel of the image shows in a window's bins."""
 
     signal: Array  #: mean of each bin [white] `[h, w]`
     usable: NDArray[np.bool_]  #: bins without a clipped pixel
@@ -88,76 +111,70 @@ class Channel:
     template: Array  #: log albedo known from elsewhere, 0 if nothing is `[h, w]`
     template_variance: Array  #: of that log albedo
 
-    def at(self, row: NDArray[np.intp], column: NDArray[np.intp]) -> Channel:
-        """The same in some of the bins `[N]`."""
-        return Channel(*(plane[row, column] for plane in vars(self).values()))
-
-
-@dataclass(frozen=True, eq=False)
-class Unlit:
-    """The same view in ambient light alone: `pixels` `[H, W]` or `[H, W, 3]`, a mean over `frames` frames."""
-
-    pixels: NDArray[np.generic]
-    frames: float
-    noise: NoiseModel
-
-    def log_albedo(self, scene: Scene, at: Window) -> tuple[Array, Array]:
-        """Log albedo of a window's bins and its variance, `[C, h, w]`.
-
-        Smoothed as far as its noise exceeds the retina's own detail.
-        """
-        sight = look(scene, window(at.row, at.column, at.height, at.width, at.side), at.side)
-        irradiance = np.maximum(ambient_irradiance(sight, scene).reshape(at.height, at.width), 1e-3)
-        light_ = linear_light(np.ascontiguousarray(at.cut(self.pixels)), scene)[0]
+    @classmethod
+    def each(cls, frame: Frame, at: Window) -> list[Shown]:
+        """The channels of a frame in a window, of an albedo that is not known."""
+        signal, clip = at.light(frame)
+        nothing = np.zeros((at.height, at.width))
         found = []
-        for shown in light_.reshape(*light_.shape[:2], -1).transpose(2, 0, 1):
-            plane = at.binned(np.ascontiguousarray(shown))
-            level = max(float(np.median(plane)), 1e-9)
-            variance = float(self.noise.variance(np.array(level))) / self.frames / at.side**2 / level**2
-            width = float(np.clip(0.5 * (variance / 1e-4) ** 0.25, 0.0, 2.5))
-            if width > 0.3:
-                plane = np.asarray(cv2.GaussianBlur(plane, (0, 0), width), float)
-                variance /= max(1.0, 4.0 * np.pi * width**2)
-            plane = np.maximum(plane, 0.1 * level)
-            found.append((np.log(plane / irradiance), variance * (level / plane) ** 2))
-        return np.stack([f[0] for f in found]), np.stack([f[1] for f in found])
+        for c in range(signal.shape[2]):
+            share = at.binned(clip[..., c].astype(np.float32)) if clip[..., c].any() else nothing
+            plane = at.binned(np.ascontiguousarray(signal[..., c]))
+            found.append(cls(plane, share == 0.0, share == 1.0, nothing, nothing))
+        return found
+
+    def told(self, log_albedo: Array, variance: Array) -> Shown:
+        """The same where something else tells the log albedo of each bin, and its variance."""
+        return replace(self, template=log_albedo, template_variance=variance)
+
+    def at(self, row: NDArray[np.intp], column: NDArray[np.intp]) -> Shown:
+        """The same in some of the bins `[N]`."""
+        return Shown(*(plane[row, column] for plane in vars(self).values()))
 
 
-def shown_in(image: NDArray[np.generic], scene: Scene, at: Window, unlit: Unlit | None) -> list[Channel]:
-    """The channels of an image `[H, W]` or `[H, W, 3]` in a window."""
-    light_, clip = linear_light(np.ascontiguousarray(at.cut(image)), scene)
-    signal, clip = light_.reshape(*light_.shape[:2], -1), clip.reshape(*light_.shape[:2], -1)
-    nothing = np.zeros((signal.shape[2], at.height, at.width))
-    template, spread = (nothing, nothing) if unlit is None else unlit.log_albedo(scene, at)
+def log_albedo(reference: Reference, scene: Scene, at: Window, noise: NoiseModel) -> tuple[Array, Array]:
+    """Log albedo that a reference shows in a window's bins, and its variance, `[C, h, w]`.
+
+    Smoothed as far as its noise exceeds the retina's own detail.
+    """
+    irradiance = ambient_irradiance(look(scene, at.pixels, at.side), scene)
+    irradiance = np.maximum(irradiance.reshape(at.height, at.width), 1e-3)
     found = []
-    for c in range(signal.shape[2]):
-        share = at.binned(clip[..., c].astype(np.float32)) if clip[..., c].any() else nothing[c]
-        plane = at.binned(np.ascontiguousarray(signal[..., c]))
-        found.append(Channel(plane, share == 0.0, share == 1.0, template[c], spread[c]))
-    return found
+    for shown in at.light(Frame(reference.pixels, scene.sensor))[0].transpose(2, 0, 1):
+        plane = at.binned(np.ascontiguousarray(shown))
+        level = max(float(np.median(plane)), 1e-9)
+        variance = float(noise.variance(np.array(level))) / reference.frames / at.side**2 / level**2
+        width = float(np.clip(VIEW.smoothing * (variance / VIEW.detail) ** 0.25, 0.0, VIEW.widest_blur))
+        if width > VIEW.least_blur:
+            plane = np.asarray(cv2.GaussianBlur(plane, (0, 0), width), float)
+            # the mean of white noise under a Gaussian: its square integrates to 1 / (4 pi width^2)
+            variance /= max(1.0, 4.0 * np.pi * width**2)
+        plane = np.maximum(plane, VIEW.darkest * level)
+        found.append((np.log(plane / irradiance), variance * (level / plane) ** 2))
+    return np.stack([f[0] for f in found]), np.stack([f[1] for f in found])
 
 
-class Grid:
+class Bins:
     """A window's bins as the model sees them: light is computed only where the cones may reach."""
 
-    def __init__(self, at: Window, estimate: Estimate, knowns: Knowns, spotlight: int, *, reach: int = 4) -> None:
-        """`reach` [bins] is how far the outlines may still move; the window is that of one `spotlight`.
+    def __init__(self, at: Window, estimate: Estimate, knowns: Knowns, spotlight: int) -> None:
+        """The window is that of one `spotlight`.
 
         Bins nearer to another spotlight's axis are not seen: they count in that one's window. Nor are those where the
         shaft may be.
         """
         self.at, self.knowns = at, knowns
         scene = estimate.scene
-        pixels = window(at.row, at.column, at.height, at.width, at.side)
+        pixels = at.pixels
         self._pixels = pixels
         mask = np.zeros((at.height, at.width), np.uint8)
         for k in range(len(scene.spotlights)):
             points = outline(estimate, k)
             if len(points) > 2:
-                bins = (points - [at.column, at.row]) / at.side - 0.5
-                cv2.fillPoly(mask, [np.round(bins).astype(np.int32)], 1)
-        near = cv2.dilate(mask, np.ones((2 * reach + 1, 2 * reach + 1), np.uint8))
-        self.lit = np.flatnonzero(near)
+                corners = (points - [at.column, at.row]) / at.side - 0.5
+                cv2.fillPoly(mask, [np.round(corners).astype(np.int32)], 1)
+        reach = 2 * VIEW.reach + 1
+        self.lit = np.flatnonzero(cv2.dilate(mask, np.ones((reach, reach), np.uint8)))
         sight = look(scene, pixels, at.side)
         ambient = ambient_irradiance(sight, scene)
         self.seen = np.isfinite(ambient)
@@ -169,13 +186,13 @@ class Grid:
             self.seen &= np.argmax(cosines, axis=1) == spotlight
         self._sight = Sight(*(field[self.lit] for field in vars(sight).values()))
 
-    def spotlight(self, estimate: Estimate, *, roll: bool) -> tuple[Array, Array]:
+    def spotlight(self, estimate: Estimate) -> tuple[Array, Array]:
         """The spotlights' irradiance on the lit bins `[N]` and its derivatives by pose and free quantities `[P, N]`."""
-        return spotlight_irradiance(self._sight, estimate, self.knowns, self._pixels[self.lit], self.at.side, roll=roll)
+        return spotlight_irradiance(self._sight, estimate, self.knowns, self._pixels[self.lit], self.at.side)
 
 
 def spotlight_irradiance(
-    sight: Sight, estimate: Estimate, knowns: Knowns, pixels: Array, side: int, *, roll: bool
+    sight: Sight, estimate: Estimate, knowns: Knowns, pixels: Array, side: int
 ) -> tuple[Array, Array]:
     """The spotlights' irradiance on bins `[N]` and its derivatives by pose and free quantities `[P, N]`.
 
@@ -183,9 +200,8 @@ def spotlight_irradiance(
     """
     free = knowns.free
     seen = look(estimate.scene, pixels, side) if {"eye_radius", "camera_height"} & set(free) else sight
-    profile = estimate.profile
     changes = estimate.beam_changes(free)
-    here = light(seen, estimate.pose, estimate.scene, profile, roll=roll, changes=changes)
+    here = light(seen, estimate.pose, estimate.scene, estimate.profile, pose_size=estimate.pose_size, changes=changes)
     rows = [here.jacobian]
     for name in (name for name in free if name not in BEAM):
         plus, minus = (

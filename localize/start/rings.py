@@ -17,8 +17,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import fft
 
-from conespot.localize.model.noise import linear_light
-from conespot.localize.model.solve import spread
+from conespot.localize.image import Frame, Reference
+from conespot.localize.model.residual import spread
 from conespot.scene.scene import Scene
 
 Array = NDArray[np.float64]
@@ -42,14 +42,14 @@ class Overview:
     floor: float  #: added before the logarithm, so that noise in the dark and dark vessels count little [white]
 
     @classmethod
-    def of(cls, image: NDArray[np.generic], scene: Scene, reference: NDArray[np.generic] | None) -> Overview:
-        """The overview of an image `[H, W]` or `[H, W, 3]`."""
-        step = max(1, image.shape[0] // _OVERVIEW_PX)
-        cut = (slice(step // 2, None, step),) * 2
-        light = _one_channel(image[cut], scene)
+    def of(cls, frame: Frame, reference: Reference | None) -> Overview:
+        """The overview of a frame."""
+        step = max(1, frame.side // _OVERVIEW_PX)
+        light = _one_channel(frame, step)
         noise = spread(np.diff(light[::3, ::2], axis=1)) / math.sqrt(2.0)
         floor = max(0.5 * float(np.median(light[::3, ::3])), 4.0 * noise, 1e-5)
-        return cls(light, None if reference is None else _one_channel(reference[cut], scene), step, floor)
+        dark = None if reference is None else _one_channel(Frame(reference.pixels, frame.sensor), step)
+        return cls(light, dark, step, floor)
 
     def logarithm(self, light: Plane, reference: Plane | None) -> Plane:
         """The logarithm of light, over that of the reference if there is one; any shape."""
@@ -142,7 +142,7 @@ def _kernels(size: int, radii: tuple[float, ...]) -> NDArray[np.complex64]:
     return np.array(result, np.complex64)
 
 
-def _one_channel(pixels: NDArray[np.generic], scene: Scene) -> Plane:
-    """Light in the image's brightest channel, pixel by pixel."""
-    light = linear_light(np.ascontiguousarray(pixels), scene)[0]
-    return np.ascontiguousarray(light if light.ndim == 2 else light.max(axis=2), np.float32)
+def _one_channel(frame: Frame, step: int) -> Plane:
+    """Light in a frame's brightest channel, every `step`-th pixel."""
+    every = slice(step // 2, None, step)
+    return np.ascontiguousarray(frame.light(every, every)[0].max(axis=2), np.float32)

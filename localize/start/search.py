@@ -15,10 +15,11 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from conespot.localize.image import Frame, Reference
 from conespot.localize.model.forward import moved, tangents
 from conespot.localize.model.outline import distances
 from conespot.localize.model.prior import Estimate
-from conespot.localize.model.solve import spread
+from conespot.localize.model.residual import spread
 from conespot.localize.outcome import Localization, LocalizationFailure, Outcome
 from conespot.localize.start.rays import rays_across, support
 from conespot.localize.start.rig import poses_on
@@ -89,16 +90,14 @@ def _circles(pose: Pose, scene: Scene) -> list[tuple[Array, float]]:
     return [(middle, float(np.mean(np.linalg.norm(outline - middle, axis=1)))) for outline, middle in middles]
 
 
-def find_start(image: NDArray[np.generic], scene: Scene, reference: NDArray[np.generic] | None = None) -> Start | str:
-    """The best first pose from an image `[H, W]` or `[H, W, 3]`, or the reason why there is none."""
-    return next(find_starts(image, scene, reference), NOTHING)
+def find_start(frame: Frame, scene: Scene, reference: Reference | None = None) -> Start | LocalizationFailure:
+    """The best first pose from a frame, or the reason why there is none."""
+    return next(find_starts(frame, scene, reference), LocalizationFailure(NOTHING))
 
 
-def find_starts(
-    image: NDArray[np.generic], scene: Scene, reference: NDArray[np.generic] | None = None
-) -> Iterator[Start]:
-    """Distinct first poses from an image `[H, W]` or `[H, W, 3]`, the one that explains it best first."""
-    overview = Overview.of(image, scene, reference)
+def find_starts(frame: Frame, scene: Scene, reference: Reference | None = None) -> Iterator[Start]:
+    """Distinct first poses from a frame, the one that explains it best first."""
+    overview = Overview.of(frame, reference)
     most = _RINGS if len(scene.spotlights) == 1 else _RINGS + 2 * len(scene.spotlights)
     rings = find_rings(overview, scene, most)
     first = [ring for ring in rings if _rivals(ring, rings[0])] if len(scene.spotlights) == 1 else rings
@@ -222,7 +221,7 @@ def _towards(estimate: Estimate, pixels: Array, spots: NDArray[np.intp], worth: 
         return None
     scene, pose = estimate.scene, estimate.pose
     roll = len(scene.spotlights) > 1
-    r, jacobian, _ = distances(pixels, spots, estimate, roll=roll)
+    r, jacobian, _ = distances(pixels, spots, estimate)
     rcm = np.asarray(scene.instrument.rcm)
     length = float(np.linalg.norm(pose.apex - rcm))
     u, v = tangents(pose.axis)

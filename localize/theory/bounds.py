@@ -81,10 +81,9 @@ def cramer_rao(
     Raises ValueError if the frame does not determine the pose (no patch in it, or nothing to hold a free quantity).
     """
     pixels = patch_pixels(scene, pose)
-    roll = len(scene.spotlights) > 1
-    size = 6 if roll else 5
-    changes = Estimate(pose, scene).beam_changes(knowns.free)
-    here = _light(scene, pose, pixels, roll=roll, changes=changes)
+    estimate = Estimate(pose, scene)
+    size = estimate.pose_size
+    here = _light(scene, pose, pixels, pose_size=size, changes=estimate.beam_changes(knowns.free))
     peak = float(np.quantile(here.value[here.value > 0.0], 0.999)) if np.any(here.value > 0.0) else 0.0
     if peak <= 0.0:
         raise ValueError("the frame shows no patch of this pose")
@@ -96,7 +95,7 @@ def cramer_rao(
     jacobian = np.concatenate([*rows, nuisance])
     information = (jacobian / (gain * here.value + sensor.background**2)) @ jacobian.T
     count = size + len(knowns.free)
-    _, prior = prior_rows(Estimate(pose, scene), scene, knowns, size)
+    _, prior = prior_rows(estimate, scene, knowns)
     information[:count, :count] += prior.T @ prior
     covariance = inverse(information)
     if np.any(np.diag(information) == 0.0) or not np.all(np.isfinite(covariance)):
@@ -109,7 +108,7 @@ def _light(
     pose: Pose,
     pixels: Array,
     *,
-    roll: bool = False,
+    pose_size: int = 5,
     changes: Sequence[tuple[Profile, Profile, float]] = (),
 ) -> Light:
     sight = look(scene, pixels)
@@ -117,7 +116,7 @@ def _light(
     if not seen.all():
         pixels = pixels[seen]
         sight = look(scene, pixels)
-    return light(sight, pose, scene, Profile.of(scene.beam), roll=roll, changes=changes)
+    return light(sight, pose, scene, Profile.of(scene.beam), pose_size=pose_size, changes=changes)
 
 
 def _difference(scene: Scene, pose: Pose, pixels: Array, name: str) -> Array:
@@ -193,7 +192,6 @@ def smoothed_over(scene: Scene, pose: Pose, *, rcm: bool) -> Array:
 
 
 def _step(pixels: Array, spots: NDArray[np.intp], at: Estimate, *, rcm: bool) -> Array:
-    roll = len(at.scene.spotlights) > 1
-    r, jac, _ = distances(pixels, spots, at, roll=roll)
-    pr, pj = prior_rows(at, at.scene, Knowns(rcm_sigma_mm=0.0 if rcm else None), 6 if roll else 5)
+    r, jac, _ = distances(pixels, spots, at)
+    pr, pj = prior_rows(at, at.scene, Knowns(rcm_sigma_mm=0.0 if rcm else None))
     return np.asarray(-np.linalg.solve(jac.T @ jac + pj.T @ pj, jac.T @ r + pj.T @ pr))

@@ -6,12 +6,15 @@ import numpy as np
 import pytest
 
 from conespot.localize import Knowns
-from conespot.localize.field.albedo import FUNDUS, Modes
+from conespot.localize.field.albedo import Modes, even
 from conespot.localize.field.roughness import Roughness
+from conespot.localize.field.settings import FIELD
 from conespot.localize.model.prior import Estimate
-from conespot.localize.model.view import Grid, Window
+from conespot.localize.model.view import Bins, Window
 from conespot.scene.camera import Camera
 from conespot.scene.scene import Scene
+
+FUNDUS = even(FIELD.fundus)
 
 
 def test_the_modes_products_are_those_of_their_sums():
@@ -83,6 +86,6 @@ def test_a_bin_between_three_patches_counts_in_one_window_only():
     count = np.zeros((1000, 1000), int)
     for spotlight in range(3):
         at = Window.around(estimate, spotlight, 1000, 0.15)
-        seen = Grid(at, estimate, Knowns(), spotlight).seen.reshape(at.height, at.width)
+        seen = Bins(at, estimate, Knowns(), spotlight).seen.reshape(at.height, at.width)
         count[at.row : at.row + at.height, at.column : at.column + at.width] += seen
     assert count.max() == 1

@@ -1,7 +1,5 @@
 """The edge fit on frames of the image model itself: how near the bound it is, and whether its covariance is honest."""
 
-from types import SimpleNamespace
-
 import numpy as np
 import pytest
 from hypothesis import given
@@ -11,8 +9,10 @@ from conespot.localize import Knowns, SensorNoise
 from conespot.localize.edge.fit import fit_edge
 from conespot.localize.edge.saturated import SaturatedFit
 from conespot.localize.edge.strips import Strips, score_covariance
+from conespot.localize.image import Frame
 from conespot.localize.model.forward import ambient_irradiance, light, look, moved, window
 from conespot.localize.model.noise import noise_of
+from conespot.localize.model.prior import Estimate
 from conespot.localize.model.profile import Profile
 from conespot.localize.theory.bounds import cramer_rao
 from conespot.scene import Scene
@@ -64,7 +64,11 @@ def placed(scene, corner, cut):
 
 
 def near(pose, seed, step=(0.02, 0.02, 0.03, 1e-3, 1e-3)):
-    return SimpleNamespace(pose=moved(pose, np.random.default_rng(seed).choice([-1.0, 1.0], 5) * np.array(step)))
+    return moved(pose, np.random.default_rng(seed).choice([-1.0, 1.0], 5) * np.array(step))
+
+
+def fitted(image, scene, start, knowns, noise):
+    return fit_edge(Frame(image, scene.sensor), Estimate(start, scene), knowns, noise)
 
 
 def error(fit, pose):
@@ -89,7 +93,7 @@ def test_over_a_uniform_retina_the_error_is_near_the_bound_and_stated(beam):
         pose = scene.pose(tip)
         bounds += [1e3 * cramer_rao(scene, pose, knowns=Knowns(rcm_sigma_mm=0.01)).position_mm] * 10
         for seed in range(10):
-            fit = fit_edge(counted(scene, pose, 100 * k + seed), scene, near(pose, seed), Knowns(0.01), NOISE)
+            fit = fitted(counted(scene, pose, 100 * k + seed), scene, near(pose, seed), Knowns(0.01), NOISE)
             errors.append(error(fit, pose))
             chi.append(chi_square(fit, pose))
             assert fit.settled
@@ -102,8 +106,8 @@ def test_over_a_uniform_retina_the_error_is_near_the_bound_and_stated(beam):
 def test_vessels_across_a_hard_edge_widen_the_covariance_and_stay_inside_it():
     scene = Scene(beam=HardBeam(), camera=Camera(resolution=1000), sensor=Linear(bits=12))
     pose = scene.pose(TIPS[0])
-    plain = fit_edge(counted(scene, pose, 1), scene, near(pose, 1), Knowns(None), NOISE)
-    striped = fit_edge(counted(scene, pose, 1, vessels), scene, near(pose, 1), Knowns(None), NOISE)
+    plain = fitted(counted(scene, pose, 1), scene, near(pose, 1), Knowns(None), NOISE)
+    striped = fitted(counted(scene, pose, 1, vessels), scene, near(pose, 1), Knowns(None), NOISE)
     assert np.trace(striped.covariance[:3, :3]) > np.trace(plain.covariance[:3, :3])
     assert chi_square(striped, pose) < 11.3
 
@@ -113,7 +117,7 @@ def test_a_sharp_patch_clipped_throughout_is_measured_by_its_clipped_pixels(cont
     scene = Scene(beam=HardBeam(), camera=Camera(resolution=1000), sensor=Srgb8())
     for k, tip in enumerate(TIPS):
         pose = scene.pose(tip)
-        fit = fit_edge(clipped(scene, pose, contrast), scene, near(pose, k), Knowns(0.01), noise_of(scene))
+        fit = fitted(clipped(scene, pose, contrast), scene, near(pose, k), Knowns(0.01), noise_of(scene))
         assert isinstance(fit, SaturatedFit)
         assert fit.settled
         assert error(fit, pose) < 15.0
@@ -125,7 +129,7 @@ def test_channels_that_clip_at_different_places_are_fitted_jointly():
     pose = scene.pose(TIPS[1])
     contrasts = (2000.0, 500.0, 60.0)
     colour = np.stack([clipped(scene, pose, c, albedo=vessels) for c in contrasts], axis=-1)
-    fit = fit_edge(colour, scene, near(pose, 2), Knowns(0.01), noise_of(scene))
+    fit = fitted(colour, scene, near(pose, 2), Knowns(0.01), noise_of(scene))
     assert len(fit.gains) == 3
     assert np.all(np.diff(fit.gains) < 0.0)
     assert error(fit, pose) < 5.0
@@ -139,7 +143,7 @@ def test_an_unknown_bump_under_the_outline_moves_the_tip_by_a_few_micrometres():
         rough.camera.project(rough.outline(pose, 0)) - smooth.camera.project(smooth.outline(pose, 0)), axis=1
     )
     assert displaced.max() > 0.5
-    fit = fit_edge(counted(rough, pose, 3), smooth, near(pose, 3), Knowns(0.01), NOISE)
+    fit = fitted(counted(rough, pose, 3), smooth, near(pose, 3), Knowns(0.01), NOISE)
     assert error(fit, pose) < 5.0
     assert chi_square(fit, pose) < 11.3
 

@@ -8,6 +8,7 @@ import cv2
 import numpy as np
 import pytest
 
+from conespot.localize.image import Frame, Reference
 from conespot.localize.outcome import Localization, LocalizationFailure
 from conespot.localize.start.rays import rays_across, support
 from conespot.localize.start.rig import poses_on
@@ -75,6 +76,10 @@ def miss(start, pose):
     return float(np.linalg.norm(start.pose.apex - pose.apex))
 
 
+def start_in(image, scene, unlit=None):
+    return find_start(Frame(image, scene.sensor), scene, None if unlit is None else Reference.of(unlit, scene))
+
+
 TIPS = ((1.0, 0.5, 4.0), (-4.2, -3.4, 5.5), (-1.5, 3.9, 2.4))
 
 
@@ -83,7 +88,7 @@ TIPS = ((1.0, 0.5, 4.0), (-4.2, -3.4, 5.5), (-1.5, 3.9, 2.4))
 def test_a_disc_as_bright_as_a_patch_does_not_mislead_the_start(beam, tip):
     scene = scene_of(beam)
     pose = scene.pose(np.array(tip))
-    assert miss(find_start(frame(scene, pose, disc=20.0), scene), pose) < 0.12
+    assert miss(start_in(frame(scene, pose, disc=20.0), scene), pose) < 0.12
 
 
 @pytest.mark.parametrize("beam", ["hard", "soft"])
@@ -91,14 +96,14 @@ def test_a_patch_that_falls_half_on_the_disc_is_found_whole(beam):
     scene = scene_of(beam)
     tip = np.array([DISC[0] - 0.3, DISC[1] - 0.9, 5.0])
     pose = scene.pose(tip)
-    assert miss(find_start(frame(scene, pose, disc=20.0), scene), pose) < 0.2
+    assert miss(start_in(frame(scene, pose, disc=20.0), scene), pose) < 0.2
 
 
 @pytest.mark.parametrize("gain", [8.0, 1000.0])
 def test_the_power_need_not_be_known(gain):
     scene = scene_of("soft")
     pose = scene.pose(np.array(TIPS[0]))
-    assert miss(find_start(frame(scene, pose, gain=gain), scene), pose) < 0.12
+    assert miss(start_in(frame(scene, pose, gain=gain), scene), pose) < 0.12
 
 
 def test_a_clipped_patch_is_read_by_its_rim():
@@ -106,7 +111,7 @@ def test_a_clipped_patch_is_read_by_its_rim():
     pose = scene.pose(np.array(TIPS[0]))
     image = np.minimum(frame(scene, pose).astype(int) * 6, 4095).astype(np.uint16)
     assert np.count_nonzero(image == 4095) > 500
-    assert miss(find_start(image, scene), pose) < 0.15
+    assert miss(start_in(image, scene), pose) < 0.15
 
 
 def test_a_patch_cut_by_the_frame_is_found_by_what_is_visible():
@@ -114,7 +119,7 @@ def test_a_patch_cut_by_the_frame_is_found_by_what_is_visible():
     pose = scene.pose(np.array([-3.9, 0.0, 6.0]))
     edge = scene.camera.project(scene.outline(pose, 0))
     assert edge[:, 0].min() < -5.0
-    assert miss(find_start(frame(scene, pose), scene), pose) < 0.3
+    assert miss(start_in(frame(scene, pose), scene), pose) < 0.3
 
 
 @pytest.mark.parametrize("roll", [0.0, 0.5, -0.9])
@@ -123,7 +128,7 @@ def test_a_rig_is_found_with_its_roll_beside_a_disc(beam, roll):
     scene = scene_of(beam, "triple")
     bare = scene.pose(np.array([-0.5, 0.4, 4.0]))
     pose = Pose(bare.apex, bare.axis, roll)
-    start = find_start(frame(scene, pose, disc=20.0), scene)
+    start = start_in(frame(scene, pose, disc=20.0), scene)
     assert miss(start, pose) < 0.1
     assert abs(math.remainder(start.pose.roll - roll, 2.0 * math.pi)) < 0.02
 
@@ -132,21 +137,21 @@ def test_a_rig_of_which_one_patch_is_missing_is_not_found():
     scene = scene_of("hard", "triple")
     pose = scene.pose(np.array(TIPS[0]))
     two = scene.model_copy(update={"spotlights": scene.spotlights[:2]})
-    assert find_start(frame(two, pose), scene) == NOTHING
+    assert start_in(frame(two, pose), scene).reason == NOTHING
 
 
 def test_a_rig_whose_patches_merge_is_found():
     scene = scene_of("soft", "triple")
     scene = scene.model_copy(update={"beam": CyclesBeam(half_angle=math.radians(12.0))})
     pose = scene.pose(np.array([1.0, 0.5, 4.0]))
-    assert miss(find_start(frame(scene, pose), scene), pose) < 0.15
+    assert miss(start_in(frame(scene, pose), scene), pose) < 0.15
 
 
 def test_a_reference_without_spotlights_takes_the_disc_away():
     scene = scene_of("half soft")
     pose = scene.pose(np.array(TIPS[0]))
     unlit = frame(scene, None, disc=20.0, seed=1)
-    assert miss(find_start(frame(scene, pose, disc=20.0), scene, unlit), pose) < 0.12
+    assert miss(start_in(frame(scene, pose, disc=20.0), scene, unlit), pose) < 0.12
 
 
 def test_colours_and_floats_are_searched_too():
@@ -154,22 +159,22 @@ def test_colours_and_floats_are_searched_too():
     pose = scene.pose(np.array(TIPS[0]))
     grey = frame(scene, pose, disc=20.0)
     colour = np.stack([grey, grey // 2, grey // 4], axis=2)
-    assert miss(find_start(colour, scene), pose) < 0.12
-    assert miss(find_start((grey / 4095.0).astype(np.float32), scene), pose) < 0.12
+    assert miss(start_in(colour, scene), pose) < 0.12
+    assert miss(start_in((grey / 4095.0).astype(np.float32), scene), pose) < 0.12
 
 
 @pytest.mark.parametrize("beam", ["hard", "soft"])
 @pytest.mark.parametrize("grey", [0, 80, 4095])
 def test_an_even_frame_has_no_start(beam, grey):
     noise = np.random.default_rng(0).normal(grey, 6.0, (SIDE, SIDE))
-    assert find_start(np.clip(noise, 0, 4095).astype(np.uint16), scene_of(beam)) == NOTHING
+    assert start_in(np.clip(noise, 0, 4095).astype(np.uint16), scene_of(beam)).reason == NOTHING
 
 
 @pytest.mark.parametrize("beam", ["hard", "soft"])
 @pytest.mark.parametrize("disc", [1.0, 20.0])
 def test_a_retina_without_a_patch_has_no_start_whatever_its_disc(beam, disc):
     scene = scene_of(beam)
-    assert find_start(frame(scene, None, disc=disc), scene) == NOTHING
+    assert start_in(frame(scene, None, disc=disc), scene).reason == NOTHING
 
 
 def test_what_the_retinas_own_mottle_shows_is_no_light():
@@ -183,7 +188,7 @@ def test_what_the_retinas_own_mottle_shows_is_no_light():
 def test_the_best_start_comes_first_and_no_two_are_the_same():
     scene = scene_of("half soft")
     pose = scene.pose(np.array([DISC[0] - 0.9, DISC[1] - 1.2, 5.0]))
-    starts = list(find_starts(frame(scene, pose, disc=20.0), scene))
+    starts = list(find_starts(Frame(frame(scene, pose, disc=20.0), scene.sensor), scene))
     assert all(a.evidence >= b.evidence for a, b in pairwise(starts))
     for k, start in enumerate(starts):
         assert all(np.linalg.norm(start.pose.apex - other.pose.apex) > 0.1 for other in starts[:k])
@@ -192,7 +197,7 @@ def test_the_best_start_comes_first_and_no_two_are_the_same():
 def test_rings_are_centred_on_round_light_and_as_large():
     image = np.full((SIDE, SIDE), 40, np.uint16)
     cv2.circle(image, (400, 250), 40, 2000, -1)
-    overview = Overview.of(image, scene_of(), None)
+    overview = Overview.of(Frame(image, scene_of().sensor), None)
     ring = find_rings(overview, scene_of(), 1)[0]
     np.testing.assert_allclose(ring.centre, (400.5, 250.5), atol=2.0)
     assert ring.radius == pytest.approx(40.0, rel=0.1)
@@ -213,7 +218,7 @@ def test_a_ring_has_one_pose_for_one_spotlight_and_the_cone_meets_the_wall_in_it
 def test_the_true_pose_explains_more_than_any_beside_it():
     scene = scene_of("soft")
     pose = scene.pose(np.array(TIPS[0]))
-    overview = Overview.of(frame(scene, pose), scene, None)
+    overview = Overview.of(Frame(frame(scene, pose), scene.sensor), None)
     here = support(rays_across(overview, scene, pose))
     for step in np.vstack([np.eye(3), -np.eye(3)]) * 0.25:
         there = support(rays_across(overview, scene, scene.pose(pose.apex + step)))

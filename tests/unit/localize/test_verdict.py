@@ -7,16 +7,14 @@ import pytest
 
 from conespot.localize.model.prior import Estimate, Knowns
 from conespot.localize.model.solve import inverse
-from conespot.localize.outcome import Localization
+from conespot.localize.outcome import COVERED, UNCERTAIN, Localization
 from conespot.localize.verdict import (
     BEHIND,
-    COVERED,
     LARGEST_FREE_SIGMA_MM,
     LARGEST_SIGMA_MM,
     MISFIT,
     MISSES_RCM,
     OUTSIDE,
-    UNCERTAIN,
     UNSETTLED,
     judged,
 )

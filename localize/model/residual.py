@@ -1,0 +1,80 @@
+"""One rule for residuals: how a bin's light misses the model, how much a miss counts, and how far misses scatter."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from conespot.localize.model.view import Shown
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class ResidualSettings:
+    """Tuned numbers of residuals."""
+
+    student: float = 4.0
+    darkest: float = 0.02
+    gross: float = 5.0
+    least_follows: float = 0.3
+    rest: tuple[float, float] = (1e-4, 0.3)
+
+
+RESIDUAL = ResidualSettings()
+
+
+def log_residuals(shown: Shown, model: Array, linear: float) -> tuple[Array, NDArray[np.bool_]]:
+    """Log of the light that a channel's bins show over the `model`'s [white], and which of them are bounds only.
+
+    To first order where they agree to a share `linear`: the mean of a logarithm of noise is not that of noise. A
+    clipped bin says only that its light is above white.
+    """
+    relative = shown.signal / model - 1.0
+    log = np.log(np.maximum(shown.signal, RESIDUAL.darkest * model) / model)
+    residual = np.where(np.abs(relative) < linear, relative, log)
+    bound = shown.clipped & (model < 1.0)
+    residual[bound] = -np.log(np.maximum(model[bound], 1e-6))
+    return residual, bound
+
+
+def student_weights(residuals: Array) -> Array:
+    """Weights of iteratively reweighted least squares for whitened residuals that follow Student's t."""
+    return np.asarray((RESIDUAL.student + 1.0) / (RESIDUAL.student + np.square(residuals)))
+
+
+def student_cost(residuals: Array) -> float:
+    """Minus twice the log-likelihood of whitened residuals that follow Student's t, but for a constant."""
+    return float(np.sum((RESIDUAL.student + 1.0) * np.log1p(np.square(residuals) / RESIDUAL.student)))
+
+
+def follows(weights: Array, residuals: Array) -> float:
+    """How far a robust fit of these `weights` follows its data, over the same weights of least squares.
+
+    It goes by the slope of the residuals' influence, which is 1 for small ones and -1 for gross errors.
+    """
+    square = np.square(residuals)
+    bend = (RESIDUAL.student - square) / (RESIDUAL.student + square)
+    return max(RESIDUAL.least_follows, float(np.sum(weights * bend) / max(np.sum(weights), 1e-300)))
+
+
+def rms(whitened: Array) -> float:
+    """Root mean square of whitened residuals, gross ones cut; infinite for none."""
+    return float(np.sqrt(np.mean(np.minimum(np.square(whitened), RESIDUAL.gross**2)))) if len(whitened) else math.inf
+
+
+def spread(residuals: Array) -> float:
+    """Robust standard deviation: 1.4826 times the median absolute value."""
+    return 1.4826 * float(np.median(np.abs(residuals))) if len(residuals) else 0.0
+
+
+def rest(residuals: Array, variances: Array, before: float) -> float:
+    """What residuals scatter beyond the sensor's `variances`, one step from `before`: albedo nothing else explains."""
+    whole = variances + before**2
+    ratio = spread(residuals / np.sqrt(whole)) ** 2
+    found = before**2 + (ratio - 1.0) * float(np.median(whole))
+    least, most = RESIDUAL.rest
+    return float(np.sqrt(np.clip(found, least**2, most**2)))
