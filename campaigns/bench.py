@@ -65,7 +65,7 @@ class Bench:
         for _, alike in itertools.groupby(group.cases, key=lambda case: case.frame):
             cases = list(alike)
             power = cases[0].scene.power.value
-            image = exposure.frame(tiles, power, frame_seed(self._plan, unit, cases[0]))
+            image = exposure.frame(tiles, power, frame_seed(unit, cases[0]))
             for case in cases:
                 unlit = self._unlit(unit, case, exposure, tiles)
                 bound = self._bound(case, pose)
@@ -85,7 +85,7 @@ class Bench:
         entry = find_localizer(localizer)
         oracle = self._plan.groups[unit.group].pose(unit.pose) if entry.needs_truth else None
         knowns, reference = (case.knowledge.knowns, unlit) if entry.takes_knowledge else (None, None)
-        scene = told(self._plan, unit, case)
+        scene = told(unit, case)
         return locate(image, scene, localizer, oracle=oracle, knowns=knowns, reference=reference)
 
     def _bound(self, case: Case, pose: Pose) -> float | None:
@@ -101,7 +101,7 @@ class Bench:
         """The view without spotlights that the case's localizers are given: taken beside the frame, or learnt."""
         knowledge, power = case.knowledge, case.scene.power.value
         if knowledge.reference:
-            seeds = [reference_seed(self._plan, unit, case, i) for i in range(knowledge.reference)]
+            seeds = [reference_seed(unit, case, i) for i in range(knowledge.reference)]
             return Reference.mean((exposure.dark(tiles, power, seed) for seed in seeds), case.scene)
         if not knowledge.sequence:
             return None
@@ -119,7 +119,7 @@ class Bench:
         for pose in np.linspace(0, len(group.positions) - 1, count).astype(int):
             other = Unit(unit.group, int(pose), group.unit(int(pose)))
             tiles = self._tiles(renderer, other)
-            ambient.add(exposure.frame(tiles, case.scene.power.value, frame_seed(self._plan, other, case)))
+            ambient.add(exposure.frame(tiles, case.scene.power.value, frame_seed(other, case)))
         return ambient.reference()
 
     def _tiles(self, renderer: Renderer, unit: Unit) -> list[Tile]:

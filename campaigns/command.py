@@ -191,13 +191,13 @@ def _theory(options: argparse.Namespace) -> Ending:
 def _report(options: argparse.Namespace) -> Ending:
     from conespot.campaigns.plan import make_plan
     from conespot.campaigns.schema import read_campaign
-    from conespot.campaigns.store import open_store
+    from conespot.campaigns.store import goes_on, open_store, read_begun_with
 
     folder: Path = options.folder
-    if (folder / "journal.jsonl").exists() and (folder / "campaign.yaml").exists():
+    # the rows of a run that names its cases otherwise are taken as they are
+    if (folder / "journal.jsonl").exists() and (folder / "campaign.yaml").exists() and goes_on(read_begun_with(folder)):
         document = read_campaign(str(folder / "campaign.yaml"))
         plan = make_plan(document)
-        # a run of another version may name its cases otherwise; then its rows are left as they are
         if plan.campaign.made_with.get("identity") == plan.identity:
             with open_store(folder, plan, document) as store:
                 store.write_rows()

@@ -16,7 +16,7 @@ from pydantic import BaseModel
 
 from conespot.campaigns.plan import Case, Plan
 from conespot.localize import find_localizer
-from conespot.scene.model import SCHEMA, identity
+from conespot.scene.identity import SCHEMA, digest
 from conespot.scene.words import assumed
 
 
@@ -66,7 +66,6 @@ def _without_points(data: Any) -> Any:
     if not isinstance(data, dict):
         return data
     if data.get("points") and isinstance(data.get("file"), str):
-        digest = identity(json.dumps(data["points"]))
-        data = {**data, "file": Path(data["file"]).name, "digest": digest}
-        del data["points"]
+        kept = {key: value for key, value in data.items() if key != "points"}
+        data = {**kept, "file": Path(data["file"]).name, "digest": digest(data["points"])}
     return {key: _without_points(value) for key, value in data.items()}

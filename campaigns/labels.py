@@ -7,7 +7,7 @@ from collections.abc import Callable, Sequence
 from typing import Any
 
 from conespot.campaigns.schema import Campaign, Combination
-from conespot.scene.model import identity
+from conespot.scene.identity import digest
 from conespot.scene.spotlights import rig_name
 from conespot.scene.surface import surface_name
 
@@ -36,7 +36,7 @@ def label_columns(cases: Sequence[Combination]) -> dict[str, Sequence[Label]]:
     for name, (key, short) in _STANDING.items():
         names = [short(case.campaign) for case in cases]
         if any(key in case.chosen for case in cases):
-            values = [json.dumps(without_files(_dumped(case, key)), sort_keys=True) for case in cases]
+            values = [json.dumps(_without_files(_dumped(case, key)), sort_keys=True) for case in cases]
             if len(set(zip(names, values, strict=True))) > len(set(names)):
                 names = [_written(case, key) for case in cases]
         columns[name] = names
@@ -57,11 +57,11 @@ def swept_columns(cases: Sequence[Combination]) -> dict[str, Sequence[Label]]:
     return columns
 
 
-def without_files(data: Any) -> Any:
+def _without_files(data: Any) -> Any:
     """Plain data without the names of the files that its points were read from."""
     if isinstance(data, dict):
-        return {k: without_files(v) for k, v in data.items() if not (k == "file" and data.get("points"))}
-    return [without_files(item) for item in data] if isinstance(data, list) else data
+        return {k: _without_files(v) for k, v in data.items() if not (k == "file" and data.get("points"))}
+    return [_without_files(item) for item in data] if isinstance(data, list) else data
 
 
 def _written(case: Combination, key: str) -> Label:
@@ -76,7 +76,7 @@ def _written(case: Combination, key: str) -> Label:
     if isinstance(value, str) or (isinstance(value, (int, float)) and not isinstance(value, bool)):
         return value
     text = json.dumps(value).replace('"', "")
-    return text if len(text) <= _LONGEST else f"{text[: _LONGEST - 20]}... {identity(text)}"
+    return text if len(text) <= _LONGEST else f"{text[: _LONGEST - 20]}... {digest(text)}"
 
 
 def _dumped(case: Combination, key: str) -> Any:

@@ -6,20 +6,18 @@ rendered once, then exposed at every power and handed to every localizer.
 
 from __future__ import annotations
 
-import json
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import BaseModel
 
+from conespot.campaigns.address import Addresses, at_one_watt, campaign_address, places_address
 from conespot.campaigns.knowledge import Knowledge
-from conespot.campaigns.labels import label_columns, swept_columns, without_files
+from conespot.campaigns.labels import label_columns, swept_columns
 from conespot.campaigns.schema import Campaign, Combination, base, combinations, makes_frames
 from conespot.scene import InputError, Pose, Scene
 from conespot.scene.document import Document
-from conespot.scene.model import identity
 
 #: frames times localizers; no more than the results read back
 MAX_ROWS = 1_000_000
@@ -142,26 +140,27 @@ class Plan:
 
 def tile_seed(plan: Plan, unit: Unit, spotlight: int) -> int:
     """The Monte Carlo seed of a tile, from the campaign's seed and what is rendered alone."""
-    return _seed(plan, plan.groups[unit.group].key, unit.pose, spotlight)
+    group = plan.groups[unit.group]
+    return _seed(group.cases[0], group.key, unit.pose, spotlight)
 
 
-def frame_seed(plan: Plan, unit: Unit, case: Case) -> int:
+def frame_seed(unit: Unit, case: Case) -> int:
     """The seed of the sensor's noise in a case's frame, the same for every localizer and whatever it knows."""
-    return _seed(plan, case.frame, unit.pose)
+    return _seed(case, case.frame, unit.pose)
 
 
-def reference_seed(plan: Plan, unit: Unit, case: Case, number: int) -> int:
+def reference_seed(unit: Unit, case: Case, number: int) -> int:
     """The seed of the noise in one of a case's frames without spotlights."""
-    return _seed(plan, case.frame, unit.pose, 1, number)
+    return _seed(case, case.frame, unit.pose, 1, number)
 
 
-def told(plan: Plan, unit: Unit, case: Case) -> Scene:
+def told(unit: Unit, case: Case) -> Scene:
     """The scene as the case's localizers are told it at a unit's pose."""
-    return case.knowledge.told(case.scene, np.random.default_rng([plan.campaign.seed, int(case.frame, 16), unit.pose]))
+    return case.knowledge.told(case.scene, np.random.default_rng([case.campaign.seed, int(case.frame, 16), unit.pose]))
 
 
-def _seed(plan: Plan, key: str, *numbers: int) -> int:
-    return int(np.random.SeedSequence([plan.campaign.seed, int(key, 16), *numbers]).generate_state(1)[0])
+def _seed(case: Case, key: str, *numbers: int) -> int:
+    return int(np.random.SeedSequence([case.campaign.seed, int(key, 16), *numbers]).generate_state(1)[0])
 
 
 @dataclass
@@ -169,8 +168,7 @@ class _Draft:
     """A case while combinations are still being found that are the same one."""
 
     combination: Combination
-    group: str
-    frame: str
+    addresses: Addresses
     localizers: list[str] = field(default_factory=list)
 
 
@@ -182,47 +180,35 @@ def make_plan(document: Document) -> Plan:
     rows = 0
     for combination in combinations(document) if makes_frames(document) else ():
         case = combination.campaign
-        visited = (case.trajectory, case.poses, case.samples, case.edge_samples, case.seed)
-        group = _address(_at_one_watt(case.scene), *visited)
-        frame = _address(case.scene, *visited)
-        draft = drafts.setdefault(_address(case.scene, *visited, case.knowledge), _Draft(combination, group, frame))
+        addresses = Addresses.of(case)
+        draft = drafts.setdefault(addresses.case, _Draft(combination, addresses))
         new = [name for name in case.localizers if name not in draft.localizers]
         draft.localizers += new
         rows += case.poses * len(new)
         if rows > MAX_ROWS:
             where = combination.document.place(["sweep"])
             raise InputError(f"{where}: more than {MAX_ROWS} rows; use fewer poses or sweep over less")
-        if group not in positions:
-            positions[group] = _positions(combination)
+        if addresses.group not in positions:
+            positions[addresses.group] = _positions(combination)
     found = [draft.combination for draft in drafts.values()]
     labels, swept = label_columns(found), swept_columns(found)
     cases: list[Case] = []
     members: dict[str, list[Case]] = {}
     for i, (key, draft) in enumerate(drafts.items()):
         columns = [{name: values[i] for name, values in table.items()} for table in (labels, swept)]
-        cases.append(Case(key, draft.frame, draft.combination.campaign, tuple(draft.localizers), *columns))
-        members.setdefault(draft.group, []).append(cases[-1])
+        cases.append(Case(key, draft.addresses.frame, draft.combination.campaign, tuple(draft.localizers), *columns))
+        members.setdefault(draft.addresses.group, []).append(cases[-1])
     groups = []
     for key, shared in members.items():
-        case = drafts[shared[0].key].combination.campaign
-        scene = _at_one_watt(case.scene)
+        case = shared[0].campaign
         samples = case.samples, case.edge_samples
         # cases that look at the same image follow each other, so that it need not be exposed twice
         first = {c.frame: i for i, c in reversed(list(enumerate(shared)))}
         alike = tuple(sorted(shared, key=lambda c: first[c.frame]))
-        groups.append(Group(key, _address(scene, *samples), scene, *samples, positions[key], alike))
-    parts = [campaign.theory, campaign.frames, campaign.bounds, sorted((c.key, sorted(c.localizers)) for c in cases)]
-    return Plan(campaign, tuple(cases), tuple(groups), identity(json.dumps(parts)))
-
-
-def _at_one_watt(scene: Scene) -> Scene:
-    return scene.model_copy(update={"power": scene.power.model_copy(update={"value": 1.0})})
-
-
-def _address(*parts: BaseModel | int) -> str:
-    """A content address that does not change with the place of the files some values came from."""
-    plain = [without_files(part.model_dump(mode="json")) if isinstance(part, BaseModel) else part for part in parts]
-    return identity(json.dumps(plain, sort_keys=True))
+        loaded = drafts[shared[0].key].addresses.scene
+        groups.append(Group(key, loaded, at_one_watt(case.scene), *samples, positions[key], alike))
+    address = campaign_address(campaign, ((case.key, case.localizers) for case in cases))
+    return Plan(campaign, tuple(cases), tuple(groups), address)
 
 
 def _positions(combination: Combination) -> NDArray[np.float64]:
@@ -230,7 +216,7 @@ def _positions(combination: Combination) -> NDArray[np.float64]:
     case, place = combination.campaign, combination.document.place(["trajectory"])
     scene = case.scene
     # the same trajectory visits the same places in every scene, so that cases can be compared pose by pose
-    key = int(_address(case.trajectory, case.poses), 16)
+    key = int(places_address(case), 16)
     try:
         positions = case.trajectory.positions(case.poses, np.random.default_rng([case.seed, key]))
     except ValueError as error:

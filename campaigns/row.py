@@ -143,20 +143,16 @@ def rows(plan: Plan, records: Mapping[str, Record]) -> Iterator[Row]:
     The order and every value depend on the campaign alone, not on who finished a unit when.
     """
     stated = _Stated.among(f for record in records.values() for f in record.findings)
-    homes = {}
-    for group in plan.groups:
-        first = 0
-        for case in group.cases:
-            homes[case.key] = group, first
-            first += len(case.localizers)
+    answers = {key: {(f.case, f.localizer): f for f in record.findings} for key, record in records.items()}
+    homes = {case.key: group for group in plan.groups for case in group.cases}
     for case in plan.cases:
-        group, first = homes[case.key]
-        for k, localizer in enumerate(case.localizers, start=first):
+        group = homes[case.key]
+        for localizer in case.localizers:
             for pose in range(len(group.positions)):
                 record = records.get(group.unit(pose))
                 if record is None:
                     continue
-                found = record.findings[k] if record.findings else None
+                found = answers[record.unit].get((case.key, localizer))
                 reason = record.error if found is None else found.reason
                 row: Row = {"case": case.key, **case.labels, "localizer": localizer, "pose": pose}
                 row |= {"status": "failed" if reason else "ok", "reason": reason}

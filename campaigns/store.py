@@ -25,19 +25,26 @@ from conespot.campaigns.schema import resolved
 from conespot.scene import InputError
 from conespot.scene.atomic import write_atomically
 from conespot.scene.document import Document, dump, read_document
+from conespot.scene.identity import SCHEMA
 
 _VERSIONS = ("conespot", "mitsuba", "drjit", "numpy", "scipy", "opencv-python-headless", "karellen-llvm-core")
 _LONGEST_LINE = 1_000_000
 
 
 def made_with(plan: Plan) -> dict[str, str]:
-    """What identifies a run and what it is made with: identity, versions, Python, platform."""
+    """What identifies a run and what it is made with: identity and its schema, versions, Python, platform."""
     versions = {}
     for package in _VERSIONS:
         with contextlib.suppress(importlib.metadata.PackageNotFoundError):
             versions[package] = importlib.metadata.version(package)
     system = f"{platform.system()} {platform.machine()}"
-    return {"identity": plan.identity, **versions, "python": platform.python_version(), "platform": system}
+    return {
+        "identity": plan.identity,
+        "schema": str(SCHEMA),
+        **versions,
+        "python": platform.python_version(),
+        "platform": system,
+    }
 
 
 class Store:
@@ -87,7 +94,8 @@ class Store:
 def open_store(folder: Path, plan: Plan, document: Document) -> Iterator[Store]:
     """The run folder of a campaign, begun or continued, for this process alone.
 
-    Raises InputError for a folder that cannot be written, is not a run's, is another campaign's or is in use.
+    Raises InputError for a folder that cannot be written, is not a run's, is another campaign's or another schema's,
+    or is in use.
     """
     try:
         _refuse_strangers(folder)
@@ -100,7 +108,12 @@ def open_store(folder: Path, plan: Plan, document: Document) -> Iterator[Store]:
         known = folder / "campaign.yaml"
         if not known.exists():
             write_atomically(known, dump(resolved(document, made_with(plan))).encode())
-        begun_with = _begun_with(known)
+        begun_with = read_begun_with(folder)
+        if not goes_on(begun_with):
+            raise InputError(
+                f"{folder}: was begun by conespot {begun_with.get('conespot')} under other names and cannot go on; "
+                f"choose another --out (`campaign report {folder}` still makes its tables)"
+            )
         if begun_with.get("identity") != plan.identity:
             raise InputError(f"{folder}: holds the run of another campaign or other settings; choose another --out")
         if plan.cases:
@@ -119,9 +132,15 @@ def _refuse_strangers(folder: Path) -> None:
         raise InputError(f"{folder}: holds other files and is not a run folder; choose another --out")
 
 
-def _begun_with(path: Path) -> dict[str, str]:
-    said = read_document(path).data.get("made_with")
+def read_begun_with(folder: Path) -> dict[str, str]:
+    """What began the run in a folder, as its campaign.yaml states it. Raises InputError if that cannot be read."""
+    said = read_document(folder / "campaign.yaml").data.get("made_with")
     return {str(k): str(v) for k, v in said.items()} if isinstance(said, dict) else {}
+
+
+def goes_on(begun_with: dict[str, str]) -> bool:
+    """Whether what began a run names its cases as we do; what states no identity is no run of another version."""
+    return "identity" not in begun_with or begun_with.get("schema") == str(SCHEMA)
 
 
 def _lock(journal: IO[bytes], folder: Path) -> None:
@@ -145,7 +164,7 @@ def _read_journal(path: Path, plan: Plan, journal: IO[bytes]) -> dict[str, Recor
     """
     expected: dict[str, list[tuple[str, str]]] = {}
     for group in plan.groups:
-        answers = [(case.key, name) for case in group.cases for name in case.localizers]
+        answers = sorted((case.key, name) for case in group.cases for name in case.localizers)
         expected.update((group.unit(i), answers) for i in range(len(group.positions)))
     records: dict[str, Record] = {}
     journal.seek(0)
@@ -157,7 +176,7 @@ def _read_journal(path: Path, plan: Plan, journal: IO[bytes]) -> dict[str, Recor
             break
         try:
             record = Record.model_validate_json(line)
-            answered = [(f.case, f.localizer) for f in record.findings]
+            answered = sorted((f.case, f.localizer) for f in record.findings)
             if record.unit not in expected or not (record.error or answered == expected[record.unit]):
                 raise ValueError("not a unit of this campaign")
         except ValueError:

@@ -3,16 +3,11 @@
 from __future__ import annotations
 
 import difflib
-import hashlib
-import json
 from collections.abc import Mapping
 from typing import Any
 
 from pydantic import BaseModel, BeforeValidator, ConfigDict, model_validator
 from pydantic_core import PydanticCustomError
-
-#: what a description means; raised whenever a default changes, or what a key does. A new key with a default does not
-SCHEMA = 1
 
 
 class Model(BaseModel):
@@ -57,10 +52,3 @@ def named(known: Mapping[str, Any], what: str) -> BeforeValidator:
         return known[value]
 
     return BeforeValidator(look_up)
-
-
-def identity(*parts: BaseModel | str | int | float | None) -> str:
-    """A content address [16 hex digits]: equal for equal descriptions, whatever file they came from."""
-    plain = [part.model_dump(mode="json") if isinstance(part, BaseModel) else part for part in parts]
-    text = json.dumps(plain, sort_keys=True, separators=(",", ":"))
-    return hashlib.sha256(text.encode()).hexdigest()[:16]

@@ -65,7 +65,7 @@ def test_cases_that_differ_in_knowledge_look_at_the_same_images(campaign):
     assert (len(plan.cases), plan.frames, plan.tiles, plan.rows) == (6, 6, 3, 18)
     unit = next(plan.units())
     group = plan.groups[unit.group]
-    seeds = [frame_seed(plan, unit, case) for case in group.cases]
+    seeds = [frame_seed(unit, case) for case in group.cases]
     assert len(set(seeds)) == 2
     assert seeds == sorted(seeds, key=seeds.index), "cases of one frame follow each other"
     assert [c.frame for c in group.cases] == [c for c in dict.fromkeys(x.frame for x in group.cases) for _ in range(3)]
@@ -73,7 +73,7 @@ def test_cases_that_differ_in_knowledge_look_at_the_same_images(campaign):
 
 def test_what_is_told_at_a_pose_is_the_same_in_every_run(campaign):
     plans = [make_plan(campaign(SWEPT)) for _ in range(2)]
-    scenes = [[told(plan, unit, plan.cases[2]) for unit in plan.units()] for plan in plans]
+    scenes = [[told(unit, plan.cases[2]) for unit in plan.units()] for plan in plans]
     assert scenes[0] == scenes[1]
     assert len({s.instrument.rcm for s in scenes[0]}) == 3, "the error is drawn for every pose"
 

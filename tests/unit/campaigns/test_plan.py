@@ -5,8 +5,8 @@ import pytest
 
 from conespot.campaigns.plan import frame_seed, make_plan, tile_seed
 from conespot.campaigns.plan_words import summary
-from conespot.campaigns.schema import override, read_campaign
-from conespot.scene import InputError
+from conespot.campaigns.schema import Campaign, override, read_campaign
+from conespot.scene import Eye, InputError, Scene
 
 
 @pytest.fixture
@@ -70,7 +70,7 @@ def test_seeds_differ_by_pose_spotlight_case_and_campaign_seed_alone(plan):
     text = "scene: paper\nposes: 3\nseed: {}\nsweep: {{scene.spotlights: [triple], scene.power.value: [0.5 W, 1 W]}}\n"
     one = plan(text.format(1))
     tiles = [tile_seed(one, u, k) for u in one.units() for k in range(3)]
-    frames = [frame_seed(one, u, c) for u in one.units() for c in one.cases]
+    frames = [frame_seed(u, c) for u in one.units() for c in one.cases]
     assert len({*tiles, *frames}) == 15
     assert tiles == [tile_seed(plan(text.format(1)), u, k) for u in one.units() for k in range(3)]
     other = plan(text.format(2))
@@ -166,3 +166,46 @@ def test_edge_samples_are_rendered_apart_and_are_counted_as_work_where_the_beam_
         stated[kind] = [next(line for line in summary(p, 1) if line.startswith("about")) for p in (plain, fine)]
     assert stated["cycles"][0] == stated["cycles"][1]
     assert stated["hard"][0] != stated["hard"][1]
+
+
+def test_a_key_that_is_new_to_campaign_and_scene_names_nothing_anew(plan, monkeypatch):
+    """Keys of all cases, frames and groups with a campaign of one key more in itself and in its eye: as without."""
+    text = "scene: {preset: paper-code, beam: {kind: hard}}\nposes: 2\nsweep: {scene.power.value: [0.5 W, 1 W]}\n"
+
+    class GlossyEye(Eye):
+        gloss: float = 0.0
+
+    class GlossyScene(Scene):
+        eye: GlossyEye = GlossyEye()
+
+    class LaterCampaign(Campaign):
+        scene: GlossyScene = GlossyScene()
+        frame_rate: int = 30
+
+    def names(made):
+        groups = [(g.key, g.scene_key) for g in made.groups]
+        return made.identity, [(c.key, c.frame) for c in made.cases], groups
+
+    now = names(plan(text))
+    monkeypatch.setattr("conespot.campaigns.schema.Campaign", LaterCampaign)
+    assert names(plan(text)) == now
+    for changed in (text + "frame_rate: 60\n", text.replace("{preset", "{eye: {gloss: 0.5}, preset")):
+        later = names(plan(changed))
+        assert later[0] != now[0]
+        assert not {key for case in later[1] for key in case} & {key for case in now[1] for key in case}
+        assert later[2][0][0] != now[2][0][0]
+
+
+def test_every_name_is_another_one(plan):
+    made = plan("scene: {}\nposes: 1\n")
+    names = [made.identity, made.cases[0].key, made.cases[0].frame, made.groups[0].key, made.groups[0].scene_key]
+    assert len(set(names)) == 5
+
+
+def test_a_seed_of_the_campaign_that_is_swept_over_moves_nothing(plan):
+    text = "scene: paper\nposes: 1\nseed: {}\nsweep: {{seed: [1, 2]}}\n"
+    first, other = plan(text.format(1)), plan(text.format(7))
+    assert first.identity == other.identity
+    assert [tile_seed(p, u, 0) for p in (first, other) for u in p.units()] == 2 * [
+        tile_seed(first, u, 0) for u in first.units()
+    ]

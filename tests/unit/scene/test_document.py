@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 
 from conespot.scene import InputError, Scene, load_scene
 from conespot.scene.document import dump, find_document, merge, read_document
-from conespot.scene.model import identity
+from conespot.scene.identity import identity
 from conespot.scene.quantity import UNITS, format_quantity, parse_quantity
 from conespot.scene.trajectory import AnyTrajectory
 

@@ -13,7 +13,7 @@ from scipy.interpolate import CubicSpline
 from conespot.scene import Camera, Eye, InputError, Scene, load_scene
 from conespot.scene.document import read_document
 from conespot.scene.height_map import ReliefMap
-from conespot.scene.model import identity
+from conespot.scene.identity import identity
 from conespot.scene.scene import read_scene
 from conespot.scene.surface import Bump, Surface, bump_grid, surface_name
 
