@@ -21,14 +21,11 @@ from conespot.localize.outcome import (
 )
 from conespot.localize.published.authors_code import coded_candidates
 from conespot.localize.published.cone_geometry import Array, Candidates, cone_over_ellipse, fitted_plane, retina_points
-from conespot.localize.published.detection import Contour, Mask, coded_mask, otsu_mask, outlines
+from conespot.localize.published.detection import Contour, Grey, Mask, coded_mask, otsu_mask, outlines
 from conespot.localize.published.ellipse import fit_ellipse
+from conespot.localize.published.settings import PUBLISHED
 from conespot.scene import Pose, Scene
 from conespot.scene.pose import rot_x, rot_y
-
-#: a - b of the ellipse [px] below which one spotlight does not tell where its cone leans; an outline of whole pixels
-#: places a - b to about that, and at 9 deg it is worth 0.15 mm sideways
-_ROUND_PX = 0.1
 
 
 def paper(image: AnyImage, scene: Scene) -> Outcome:
@@ -82,7 +79,7 @@ def _float_candidates(outline: Contour, scene: Scene) -> Candidates | Localizati
 def _localize(
     image: AnyImage,
     scene: Scene,
-    segment: Callable[[np.ndarray], Mask],
+    segment: Callable[[Grey], Mask],
     reconstruct: Callable[[Contour, Scene], Candidates | LocalizationFailure],
     unite: Callable[..., Array],
     truth: Pose | None,
@@ -99,7 +96,7 @@ def _localize(
     if truth is not None:
         positions = np.stack([_nearest(pair.apexes, truth.apex) for pair in pairs])
     elif len(pairs) == 1:
-        if pairs[0].flattening < _ROUND_PX * scene.camera.pixel_pitch:
+        if pairs[0].flattening < PUBLISHED.round_px * scene.camera.pixel_pitch:
             return LocalizationFailure(NEAR_CIRCLE)
         positions = from_rcm(pairs[0], scene)[None, :]
     else:

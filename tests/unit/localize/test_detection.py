@@ -3,7 +3,8 @@ import numpy as np
 import pytest
 
 from conespot.localize.outcome import CUT_BY_BORDER, FEWER_PATCHES, NOTHING_FOUND
-from conespot.localize.published.detection import CODED_MEDIAN, CODED_THRESHOLD, coded_mask, otsu_mask, outlines
+from conespot.localize.published import detection
+from conespot.localize.published.detection import Mask
 
 
 def disc(side, *circles):
@@ -12,27 +13,16 @@ def disc(side, *circles):
     return np.any(inside, axis=0).astype(np.uint8)
 
 
-@pytest.mark.parametrize("spread", [2, 10, 60])
-@pytest.mark.parametrize("shape", [(9, 9), (40, 57), (301, 300)])
-def test_counting_bright_pixels_is_the_median_then_the_threshold_to_the_border(spread, shape):
-    noise = np.random.default_rng(spread).normal(CODED_THRESHOLD, spread, shape)
-    grey = np.clip(noise, 0, 255).astype(np.uint8)
-    grey[: shape[0] // 2, :4] = 255
-    slow = cv2.threshold(cv2.medianBlur(grey, CODED_MEDIAN), CODED_THRESHOLD, 1, cv2.THRESH_BINARY)[1]
-    assert 0 < slow.mean() < 1
-    np.testing.assert_array_equal(coded_mask(grey), slow)
-
-
-def test_the_threshold_is_above_fifty_not_at_it():
-    assert not coded_mask(np.full((20, 20), 50, np.uint8)).any()
-    assert coded_mask(np.full((20, 20), 51, np.uint8)).all()
+def outlines(frame, count):
+    return detection.outlines(Mask.above(frame, 0), count)
 
 
 def test_otsu_parts_two_levels_whatever_they_are():
     patch = disc(200, (90.0, 110.0, 40.0))
     for low, high in ((3, 20), (37, 255), (120, 160)):
-        mask = otsu_mask(np.where(patch > 0, high, low).astype(np.uint8))
-        assert np.count_nonzero(mask != patch) < 0.02 * patch.sum()
+        mask = detection.otsu_mask(np.where(patch > 0, high, low).astype(np.uint8))
+        inside = patch[mask.top :, mask.left :][: mask.bright.shape[0], : mask.bright.shape[1]]
+        assert np.count_nonzero(mask.bright != inside) + patch.sum() - inside.sum() < 0.02 * patch.sum()
 
 
 def test_an_outline_is_centred_on_its_disc_and_half_a_pixel_inside():

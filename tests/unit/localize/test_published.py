@@ -201,7 +201,7 @@ def test_a_line_of_pixels_carries_no_ellipse(frames):
     assert text_candidates(line[:4], scene).reason == NO_ELLIPSE
 
 
-@pytest.mark.parametrize(("name", "limit"), [("paper-code", 0.10), ("paper", 0.15)])
+@pytest.mark.parametrize(("name", "limit"), [("paper-code", 0.04), ("paper", 0.08)])
 def test_a_full_frame_of_25_megapixels_is_localized_in_time_on_one_core(frames, name, limit):
     scene = frames.make_scene(resolution=5000)
     image = frames.frame(scene, scene.pose(TIPS[0]))
