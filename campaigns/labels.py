@@ -7,6 +7,7 @@ from collections.abc import Callable, Sequence
 from typing import Any
 
 from conespot.campaigns.schema import Campaign, Combination
+from conespot.results.columns import names as declared
 from conespot.scene.identity import digest
 from conespot.scene.spotlights import rig_name
 from conespot.scene.surface import surface_name
@@ -14,7 +15,7 @@ from conespot.scene.surface import surface_name
 Label = str | float
 _LONGEST = 120
 
-#: the standing columns: which key of the campaign each tells, and its short name
+#: the standing labels: which key of the campaign each tells, and its short name
 _STANDING: dict[str, tuple[str, Callable[[Campaign], Label]]] = {
     "trajectory": ("trajectory", lambda c: c.trajectory.kind),
     "spotlights": ("scene.spotlights", lambda c: rig_name(c.scene.spotlights)),
@@ -33,7 +34,8 @@ def label_columns(cases: Sequence[Combination]) -> dict[str, Sequence[Label]]:
     Where a swept key gives two cases the same short name (two helices), it is the value as the file writes it.
     """
     columns: dict[str, Sequence[Label]] = {}
-    for name, (key, short) in _STANDING.items():
+    for name in declared("label"):
+        key, short = _STANDING[name]
         names = [short(case.campaign) for case in cases]
         if any(key in case.chosen for case in cases):
             values = [json.dumps(_without_files(_dumped(case, key)), sort_keys=True) for case in cases]

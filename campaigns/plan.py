@@ -16,11 +16,9 @@ from conespot.campaigns.address import Addresses, at_one_watt, campaign_address,
 from conespot.campaigns.knowledge import Knowledge
 from conespot.campaigns.labels import label_columns, swept_columns
 from conespot.campaigns.schema import Campaign, Combination, base, combinations, makes_frames
+from conespot.results.columns import MAX_ROWS
 from conespot.scene import InputError, Pose, Scene
 from conespot.scene.document import Document
-
-#: frames times localizers; no more than the results read back
-MAX_ROWS = 1_000_000
 
 
 @dataclass(frozen=True)

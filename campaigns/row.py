@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Annotated
 import numpy as np
 from pydantic import Field, FiniteFloat, model_validator
 
+from conespot.results.columns import TIP, TIP_ERROR, TIP_SIGMA, TRUE_TIP
 from conespot.scene import Pose, Scene
 from conespot.scene.model import Model
 
@@ -20,7 +21,6 @@ if TYPE_CHECKING:
 Vector = tuple[FiniteFloat, FiniteFloat, FiniteFloat]
 Row = dict[str, str | float]
 _NAN = math.nan
-_XYZ = ("x", "y", "z")
 
 
 class Finding(Model):
@@ -68,11 +68,11 @@ def errors(true: Pose, found: Finding | None, rcm: Vector) -> Row:
     rotation about Y and about Z, and `rotation_error_deg` is the root of the sum of the squares of their errors.
     `axis_error_deg` is the angle between the true axis and the one that was found.
     """
-    row: Row = {f"true_{c}_mm": float(v) for c, v in zip(_XYZ, true.apex, strict=True)}
+    row: Row = {name: float(v) for name, v in zip(TRUE_TIP, true.apex, strict=True)}
     apex, axis = (np.array(v or (_NAN,) * 3) for v in ((found.apex, found.axis) if found else (None, None)))
     offset = apex - true.apex
-    row |= {f"est_{c}_mm": float(v) for c, v in zip(_XYZ, apex, strict=True)}
-    row |= {f"error_{c}_mm": float(v) for c, v in zip(_XYZ, offset, strict=True)}
+    row |= {name: float(v) for name, v in zip(TIP, apex, strict=True)}
+    row |= {name: float(v) for name, v in zip(TIP_ERROR, offset, strict=True)}
     row["position_error_mm"] = float(np.linalg.norm(offset))
     tilt = azimuth = _NAN
     if found and found.apex and found.apex != tuple(rcm):
@@ -120,7 +120,7 @@ class _Stated:
                 with contextlib.suppress(np.linalg.LinAlgError):
                     chi2 = float(error @ np.linalg.solve(np.array([line[:3] for line in found.covariance[:3]]), error))
             row = {"true_in_frame": _in_frame(true, scene)}
-            row |= {f"est_sigma_{c}_mm": sigma for c, sigma in zip(_XYZ, spread, strict=False)}
+            row |= dict(zip(TIP_SIGMA, spread, strict=False))
             row |= {"est_chi2_tip": chi2, "est_sigma_axis_deg": math.degrees(math.hypot(spread[3], spread[4]))}
             row |= {"est_sigma_roll_deg": math.degrees(spread[5])} if self.sigmas > 5 else {}
         if self.roll:
@@ -138,7 +138,7 @@ def _in_frame(pose: Pose, scene: Scene) -> float:
 
 
 def rows(plan: Plan, records: Mapping[str, Record]) -> Iterator[Row]:
-    """The rows of all finished units in the plan's order: case, localizer, pose.
+    """The rows of all finished units in the plan's order: case, localizer, pose. Columns: conespot.results.columns.
 
     The order and every value depend on the campaign alone, not on who finished a unit when.
     """
@@ -154,7 +154,7 @@ def rows(plan: Plan, records: Mapping[str, Record]) -> Iterator[Row]:
                     continue
                 found = answers[record.unit].get((case.key, localizer))
                 reason = record.error if found is None else found.reason
-                row: Row = {"case": case.key, **case.labels, "localizer": localizer, "pose": pose}
+                row: Row = {"case": case.key, "frame": case.frame, **case.labels, "localizer": localizer, "pose": pose}
                 row |= {"status": "failed" if reason else "ok", "reason": reason}
                 row |= errors(group.pose(pose), found, case.scene.instrument.rcm)
                 yield row | stated.row(group.pose(pose), found, case.scene) | case.swept

@@ -17,7 +17,8 @@ import pandas as pd
 from numpy.typing import ArrayLike
 from pandas.api.types import is_numeric_dtype
 
-from conespot.results.rows import METRICS, Rows
+from conespot.results.columns import METRICS
+from conespot.results.rows import Rows
 
 WHISKER_IQR = 1.5
 STATISTICS = (
@@ -42,8 +43,7 @@ def box_statistics(values: ArrayLike, failed: int = 0) -> dict[str, Any]:
     """
     x = np.sort(np.asarray(values, float))
     if x.size == 0:
-        nothing = dict.fromkeys(STATISTICS[2:-1], math.nan)
-        return {"n": 0, "failed": failed, **nothing, "outliers": []}
+        return {**dict.fromkeys(STATISTICS, math.nan), "n": 0, "failed": failed, "outliers": []}
     q1, median, q3 = np.quantile(x, (0.25, 0.5, 0.75))
     reach = WHISKER_IQR * (q3 - q1)
     inside = x[(x >= q1 - reach) & (x <= q3 + reach)]
@@ -76,13 +76,25 @@ def box_table(rows: Rows) -> pd.DataFrame:
 
 
 def encode_boxes(boxes: pd.DataFrame) -> bytes:
-    """The boxes as CSV; outliers as a JSON list, numbers to nine digits."""
+    """The boxes as CSV; outliers as a JSON list, statistics to nine digits, settings exactly."""
     written = boxes.assign(outliers=[json.dumps([float(f"{v:.9g}") for v in row]) for row in boxes["outliers"]])
+    for name in boxes.columns.difference([*STATISTICS, "metric"]):
+        if is_numeric_dtype(boxes[name]):
+            written[name] = [_exactly(value) for value in boxes[name].tolist()]
     return written.to_csv(index=False, float_format="%.9g", lineterminator="\n").encode()
 
 
 def read_boxes(path: Path, rows: Rows) -> pd.DataFrame:
     """The boxes of `rows` that `encode_boxes` wrote to a file."""
-    kinds: dict[str, Any] = {name: str for name in rows.group if not is_numeric_dtype(rows.frame[name])}
-    boxes = pd.read_csv(path, dtype=kinds, keep_default_na=False, na_values={name: [""] for name in STATISTICS[:-1]})
+    missing = {name: [""] for name in STATISTICS if name != "outliers"}
+    boxes = pd.read_csv(path, dtype=dict.fromkeys(rows.group, str), keep_default_na=False, na_values=missing)
+    for name in rows.group:  # not by pandas, which may not read back the number that was written
+        if is_numeric_dtype(rows.frame[name]):
+            boxes[name] = pd.Series([float(value) for value in boxes[name]], dtype=rows.frame[name].dtype)
     return boxes.assign(outliers=[json.loads(row) for row in boxes["outliers"]])
+
+
+def _exactly(value: float) -> str:
+    """Powers and swept numbers say which box is which: they read back as they are."""
+    short = f"{value:.9g}"
+    return short if float(short) == value else repr(value)

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Hashable, Sequence
+from collections.abc import Hashable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
 import pandas as pd
 
+from conespot.results.assumptions import Cases, assumptions
 from conespot.results.comparison import Comparison, compare_lights
 from conespot.results.comparison_figure import comparison_figure
 from conespot.results.light_exposure import light_exposures
@@ -36,9 +37,12 @@ def compare_runs(folders: Sequence[Path], a: str | None = None, b: str | None = 
         raise InputError(
             f"{source}: all frames are in one light, {a}; sweep over scene.illumination or give a second run"
         )
+    cases = {key: case for run in runs for key, case in run.cases.items()}
+    frame = pd.concat([r.frame for r in rows], ignore_index=True)
     comparisons = [c for other in others for c in compare_lights(rows, a, other, source)]
     exposures = {name: e for run in runs for name, e in light_exposures(run).items() if name in (a, *others)}
-    text = _text(comparisons, exposures)
+    assumed = {name: _assumed(cases, frame[frame["illumination"] == name]) for name in (a, *others)}
+    text = _text(comparisons, exposures, assumed)
     folder = folders[0]
     for part in ("tables", "figures"):
         (folder / part).mkdir(exist_ok=True)
@@ -46,7 +50,8 @@ def compare_runs(folders: Sequence[Path], a: str | None = None, b: str | None = 
     write_atomically(folder / "tables" / "comparison.csv", _table(comparisons).encode())
     with style():
         for c in comparisons:
-            save(comparison_figure(c), folder / "figures" / f"comparison_{c.b}_{c.a}_{c.localizer}".replace(" ", "-"))
+            figure = comparison_figure(c, f"{assumed[c.a]}\n{assumed[c.b]}")
+            save(figure, folder / "figures" / f"comparison_{c.b}_{c.a}_{c.localizer}".replace(" ", "-"))
     return text
 
 
@@ -59,12 +64,18 @@ def _table(comparisons: Sequence[Comparison]) -> str:
     return str(table.rename(columns=names).to_csv(index=False, float_format="%.9g"))
 
 
-def _text(comparisons: Sequence[Comparison], exposures: dict[str, RetinalExposure]) -> str:
+def _assumed(cases: Cases, rows: pd.DataFrame) -> str:
+    """What the numbers of a light assume, in a line."""
+    return f"{rows['illumination'].iloc[0]} assumes: {assumptions(cases, rows).sentence()}."
+
+
+def _text(comparisons: Sequence[Comparison], exposures: dict[str, RetinalExposure], assumed: Mapping[str, str]) -> str:
     lines = ["Position errors, paired pose by pose; a pose counts once, with its median over the powers.", ""]
     for c in comparisons:
         lines += [c.sentence, ""]
         lines += [f"  {_line(row)}" for row in c.table.to_dict("records")]
         lines.append("")
+    lines += [*assumed.values(), ""]
     lines.append("Retinal exposure at the highest power, worst over the poses:")
     lines += [f"  {name}: {exposure.sentence}" for name, exposure in exposures.items()]
     return "\n".join(lines) + "\n"

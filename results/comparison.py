@@ -11,6 +11,7 @@ import pandas as pd
 from numpy.typing import NDArray
 from scipy.stats import binomtest, wilcoxon
 
+from conespot.results.columns import SETTING
 from conespot.results.rows import Rows
 from conespot.scene import InputError
 
@@ -21,8 +22,8 @@ _LEVEL = 0.05
 _RESAMPLES = 4000
 #: numbers drawn in one go: bounds the memory
 _AT_ONCE = 2_000_000
-#: columns that say what a frame is apart from its light; the sensor belongs to the light
-_SETTING = ("trajectory", "spotlights", "surface", "resolution_px", "localizer")
+#: columns that say what a frame is apart from its light, to which the sensor belongs, and its power
+_FRAME = tuple(name for name in SETTING if name not in ("illumination", "sensor", "power_w", "localizer"))
 
 
 @dataclass(frozen=True)
@@ -96,7 +97,7 @@ def compare_lights(rows: Sequence[Rows], a: str, b: str, source: str) -> list[Co
     sides = [frame[frame["illumination"] == name] for name in (a, b)]
     # a key that is swept along with the light (its ambient light, its camera) belongs to the light
     shared = [c for c in swept if c in sides[0] and set(sides[0][c].astype(str)) == set(sides[1][c].astype(str))]
-    keys = [*_SETTING, *shared, "power_w", "pose"]
+    keys = [*_FRAME, "localizer", *shared, "power_w", "pose"]
     for name, side in zip((a, b), sides, strict=True):
         if side.duplicated(keys).any():
             raise InputError(f"{source}: {name} has several frames of one pose and power; compare one camera at a time")
@@ -108,13 +109,13 @@ def compare_lights(rows: Sequence[Rows], a: str, b: str, source: str) -> list[Co
         raise InputError(
             f"{source}: the poses in {a} and {b} differ by {moved:.3g} mm; only the same poses can be paired"
         )
-    groups = [*_SETTING[:-1], *shared, "power_w"]
+    groups = [*_FRAME, *shared, "power_w"]
     found = []
     for localizer, mine in both.groupby("localizer", sort=False):
         lines = []
         for values, here in mine.groupby(groups, sort=False):
             lines.append({**dict(zip(groups, values, strict=True)), **vars(difference(here))})
-        overall = _overall(mine, [*_SETTING[:-1], *shared, "pose"])
+        overall = _overall(mine, [*_FRAME, *shared, "pose"])
         found.append(Comparison(a, b, str(localizer), pd.DataFrame(lines), overall))
     return found
 

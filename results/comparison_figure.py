@@ -11,13 +11,16 @@ from conespot.results.style import COLOURS, frame, plain_numbers
 _MOST_PANELS = 6
 
 
-def comparison_figure(comparison: Comparison) -> Figure:
-    """Columns: settings. Above, the medians of both lights; below, the median difference with its interval."""
+def comparison_figure(comparison: Comparison, assumed: str) -> Figure:
+    """Columns: settings. Above, the medians of both lights; below, the median difference with its interval.
+
+    `assumed` is what the numbers of both lights rest on.
+    """
     table = comparison.table
     names = [c for c in ("trajectory", "spotlights", "surface") if table[c].nunique() > 1] or ["trajectory"]
     parts = list(table.groupby(names, sort=False))[:_MOST_PANELS]
     figure = Figure(figsize=(1.5 + 4.0 * max(len(parts), 2), 6.4), layout="constrained")
-    frame(figure, f"{comparison.b} against {comparison.a}, {comparison.localizer}", comparison.sentence)
+    frame(figure, f"{comparison.b} against {comparison.a}, {comparison.localizer}", f"{comparison.sentence}\n{assumed}")
     grid = figure.subplots(2, len(parts), sharex=True, sharey="row", squeeze=False)
     colours = {comparison.a: COLOURS["about Y"], comparison.b: COLOURS["failed"]}
     for column, (values, part) in enumerate(parts):

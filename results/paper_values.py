@@ -82,6 +82,18 @@ def paper_value(source: str, trajectory: str, spotlights: str, quantity: str, me
     return None
 
 
+def paper_table(surface: str, trajectory: str) -> str | None:
+    """The paper's table of errors on a surface along a trajectory, or None where it has none."""
+    return next(
+        (
+            row.source
+            for row in paper_errors()
+            if row.source.startswith("Table") and (row.surface, row.trajectory) == (surface, trajectory)
+        ),
+        None,
+    )
+
+
 def paper_means(
     source: str | None, trajectory: str, rigs: Iterable[str], metric: str, largest: float
 ) -> dict[str, float]:

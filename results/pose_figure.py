@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from typing import ClassVar
 
 import numpy as np
 import pandas as pd
@@ -11,18 +12,46 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.ticker import MaxNLocator
 
+from conespot.results.assumptions import power_in_words
+from conespot.results.columns import TIP_ERROR, column
+from conespot.results.error_tables import reference_power
+from conespot.results.figure_kind import Cut, FigureKind
 from conespot.results.paper_values import paper_means
 from conespot.results.style import COLOURS, frame, panel_title, paper_label, plain_numbers
 from conespot.results.variants import ordered
 
-#: per row of panels: what it shows, its unit, the signed parts, the overall error, its published source
+#: per row of panels: what it shows, the signed parts, the overall error
 _PANELS = (
-    ("Position", "mm", {"x": "error_x_mm", "y": "error_y_mm", "z": "error_z_mm"}, "position_error_mm"),
-    ("Rotation", "deg", {"about Y": "error_rot_y_deg", "about Z": "error_rot_z_deg"}, "rotation_error_deg"),
+    ("Position", dict(zip("xyz", TIP_ERROR, strict=True)), "position_error_mm"),
+    ("Rotation", {"about Y": "error_rot_y_deg", "about Z": "error_rot_z_deg"}, "rotation_error_deg"),
 )
 _MOST_RIGS = 4
 _DASHED = (0, (5, 3))
 _LOG_ABOVE = 30.0  #: an error this many times the 75 % quantile would press all others flat
+
+
+class AlongTrajectory(FigureKind):
+    """Errors pose by pose at 1 W, or else at the highest power."""
+
+    name = "along"
+    what = "Errors along the"
+    numbers: ClassVar = {"box": 8, "helix": 9}
+
+    def caption(self, cut: Cut) -> str:
+        """Power, failures, and what is assumed."""
+        rows = _at_reference(cut.rows)
+        failed = int((rows["status"] == "failed").sum())
+        counted = f"{failed} of {len(rows)} frames failed{' (red crosses)' if failed else ''}."
+        power = power_in_words(cut.run.cases, rows)
+        return f"At {power}. Signed per axis; overall is their length. {counted}\n{cut.assumed}"
+
+    def draw(self, cut: Cut, title: str, caption: str) -> Figure:
+        """The figure at that power."""
+        return pose_figure(_at_reference(cut.rows), title, caption, cut.paper_table)
+
+
+def _at_reference(rows: pd.DataFrame) -> pd.DataFrame:
+    return rows[rows["power_w"] == reference_power(set(rows["power_w"]))]
 
 
 def pose_figure(rows: pd.DataFrame, title: str, caption: str, source: str | None) -> Figure:
@@ -34,18 +63,18 @@ def pose_figure(rows: pd.DataFrame, title: str, caption: str, source: str | None
     figure = Figure(figsize=(1.2 + 4.6 * max(len(rigs), 1.35), 6.6), layout="constrained")
     frame(figure, title, caption)
     grid = figure.subplots(len(_PANELS), len(rigs), sharex=True, sharey="row", squeeze=False)
-    for row, (what, unit, parts, overall) in enumerate(_PANELS):
+    for row, (what, parts, overall) in enumerate(_PANELS):
         most = float(rows.loc[rows["status"] == "ok", overall].max())
         published = paper_means(source, str(rows["trajectory"].iloc[0]), rigs, overall, most)
-        for column, rig in enumerate(rigs):
-            axes = grid[row, column]
-            panel_title(axes, row * len(rigs) + column, what, rig)
+        for k, rig in enumerate(rigs):
+            axes = grid[row, k]
+            panel_title(axes, row * len(rigs) + k, what, rig)
             _draw(axes, rows[rows["spotlights"] == rig], parts, overall)
             if rig in published:
                 axes.axhline(published[rig], color=COLOURS["paper"], linewidth=1.2, linestyle=_DASHED, zorder=2)
         linear_to = _scale(grid[row, 0], rows, [*parts.values(), overall])
         beyond = f"\nlogarithmic beyond ±{linear_to:g}" if linear_to else ""
-        grid[row, 0].set_ylabel(f"{what.lower()} error [{unit}]{beyond}")
+        grid[row, 0].set_ylabel(f"{what.lower()} error [{column(overall).unit}]{beyond}")
         _legend(grid[row, -1], [*parts, "overall"], source and paper_label(source, bool(published)))
     figure.align_ylabels(grid[:, 0])
     for axes in grid[-1]:
@@ -57,8 +86,8 @@ def _draw(axes: Axes, rows: pd.DataFrame, parts: dict[str, str], overall: str) -
     rows = rows.sort_values("pose")
     located = rows["status"] == "ok"
     axes.axhline(0.0, color="#9AA1AC", linewidth=0.8, zorder=1)
-    for name, column in [*parts.items(), ("overall", overall)]:
-        values = rows[column].where(located)  # a failed pose breaks the line
+    for name, error in [*parts.items(), ("overall", overall)]:
+        values = rows[error].where(located)  # a failed pose breaks the line
         width = 1.8 if name == "overall" else 1.0
         # a pose between two failed ones has no line
         axes.plot(rows["pose"], values, ".-", color=COLOURS[name], linewidth=width, markersize=3.0, zorder=3)

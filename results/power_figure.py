@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 import pandas as pd
@@ -11,14 +11,46 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
+from conespot.results.assumptions import power_in_words
+from conespot.results.columns import column
+from conespot.results.figure_kind import Cut, FigureKind
 from conespot.results.paper_values import REFERENCE_POWER_W, paper_means
 from conespot.results.style import COLOURS, frame, panel_title, paper_label, plain_numbers
 from conespot.results.variants import ordered
 
-_PANELS = (("Position", "mm", "position_error_mm"), ("Rotation", "deg", "rotation_error_deg"))
+_PANELS = (("Position", "position_error_mm"), ("Rotation", "rotation_error_deg"))
 _MOST_RIGS = 4
 _PAPER: dict[str, Any] = {"markersize": 6.0, "markerfacecolor": "none", "color": COLOURS["paper"]}
+_TUKEY = (
+    "Boxes: quartiles; line: median; dot: mean; whiskers: farthest values within 1.5 interquartile ranges (Tukey); "
+    "crosses: values beyond them."
+)
 _LOG_ABOVE = 12.0  #: largest value over the largest quartile, above which a linear axis shows outliers only
+
+
+class OverPower(FigureKind):
+    """Boxes over light power, where there is more than one."""
+
+    name = "power"
+    what = "Errors over light power,"
+    numbers: ClassVar = {"box": 10, "helix": 11}
+
+    def suits(self, cut: Cut) -> bool:
+        """Whether power varies."""
+        return bool(cut.boxes["power_w"].nunique() > 1)
+
+    def caption(self, cut: Cut) -> str:
+        """What a box is, failures, the range of powers, and what is assumed."""
+        failed, frames = int((cut.rows["status"] == "failed").sum()), len(cut.rows)
+        red = " (in red: how many at each power)" if failed else ""
+        powers = cut.rows["power_w"]
+        least, most = (power_in_words(cut.run.cases, cut.rows[powers == p]) for p in (powers.min(), powers.max()))
+        counted = f"{failed} of {frames} frames failed{red}; boxes hold the others. From {least} to {most}."
+        return f"{_TUKEY} {counted}\n{cut.assumed}"
+
+    def draw(self, cut: Cut, title: str, caption: str) -> Figure:
+        """The figure, from the stored boxes alone."""
+        return power_figure(cut.boxes, title, caption, cut.paper_table)
 
 
 def power_figure(boxes: pd.DataFrame, title: str, caption: str, source: str | None) -> Figure:
@@ -34,17 +66,17 @@ def power_figure(boxes: pd.DataFrame, title: str, caption: str, source: str | No
     grid = figure.subplots(len(_PANELS), len(rigs), sharex=True, sharey="row", squeeze=False)
     pad = 15.0 if boxes["failed"].any() else 7.0  # the numbers of failed frames stand below the titles
     paper = source if REFERENCE_POWER_W in powers else None
-    for row, (what, unit, metric) in enumerate(_PANELS):
+    for row, (what, metric) in enumerate(_PANELS):
         here = boxes[boxes["metric"] == metric]
         published = paper_means(paper, str(boxes["trajectory"].iloc[0]), rigs, metric, float(here["max"].max()))
         _scale(grid[row, 0], here, max(published.values(), default=0.0))
-        for column, rig in enumerate(rigs):
-            axes = grid[row, column]
-            panel_title(axes, row * len(rigs) + column, what, rig, pad)
+        for k, rig in enumerate(rigs):
+            axes = grid[row, k]
+            panel_title(axes, row * len(rigs) + k, what, rig, pad)
             _draw(axes, here[here["spotlights"] == rig], powers)
             if rig in published:
                 axes.plot(powers.index(REFERENCE_POWER_W), published[rig], "D", **_PAPER, zorder=5)
-        grid[row, 0].set_ylabel(f"{what.lower()} error [{unit}]")
+        grid[row, 0].set_ylabel(f"{what.lower()} error [{column(metric).unit}]")
         if row == 0:
             _legend(grid[0, -1], paper and paper_label(paper, bool(published)))
     figure.align_ylabels(grid[:, 0])

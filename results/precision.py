@@ -11,11 +11,13 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from conespot.results.rows import STATED
+from conespot.results.assumptions import Assumptions, assumptions
+from conespot.results.columns import TIP_SIGMA
 from conespot.results.run import Run
 from conespot.results.table import Block, Table, number
 from conespot.results.variants import by_axes, split
 
+_MOST_SETS = 40
 #: 95 % of chi-squared with three degrees of freedom
 _INSIDE = 7.814727903251179
 _GROSS_SIGMAS, _GROSS_MM = 6.0, 0.05
@@ -30,20 +32,26 @@ _NOTES = (
 
 def precision_table(run: Run) -> Table | None:
     """The table of a run in which a localizer states its sigmas; None if there is none."""
-    if run.rows is None or not set(STATED[:5]) <= set(run.rows.frame):
+    if run.rows is None or not {*TIP_SIGMA, "est_chi2_tip", "true_in_frame"} <= set(run.rows.frame):
         return None
     records: list[dict[str, Any]] = []
     lines: list[tuple[str, ...]] = []
+    sets: dict[Assumptions, list[str]] = {}
     for variant, part in split(run.rows.frame, run.rows.group):
         for axes, here in by_axes(part):
             found = precision(here)
-            records.append({**variant.setting, **axes, **found})
+            assumed = assumptions(run.cases, here)
+            records.append({**variant.setting, **axes, **found, **assumed.columns()})
+            of = sets.setdefault(assumed, [])
+            if variant.label not in of:
+                of.append(variant.label)
             place = " ".join(str(axes[name]) for name in ("trajectory", "spotlights", "surface"))
             lines.append((variant.label, place, f"{axes['power_w']:g}", *_cells(found)))
     reached = ("mean", "rms", "max", "axis", "roll")
     header = ("localizer", "frames", "power [W]", "n", "refused", "outside", *reached, "sigma", "inside", "gross",
               "bound", "ratio")  # fmt: skip
-    block = Block("", header, tuple(lines), _NOTES)
+    assumes = tuple(f"{' and '.join(labels)}: assumes {one.sentence()}." for one, labels in sets.items())
+    block = Block("", header, tuple(lines), (*_NOTES, *assumes[:_MOST_SETS]))
     return Table("precision", "Precision: reached, stated, and possible", pd.DataFrame(records), (block,))
 
 
@@ -51,7 +59,7 @@ def precision(rows: pd.DataFrame) -> dict[str, float]:
     """Numbers of the rows of one setting [mm, deg]; NaN where nothing was localized or stated."""
     good = rows[rows["status"] == "ok"]
     error = good["position_error_mm"].to_numpy()
-    sigma = np.sqrt(np.sum(np.square(good[list(STATED[:3])].to_numpy()), axis=1))
+    sigma = np.sqrt(np.sum(np.square(good[list(TIP_SIGMA)].to_numpy()), axis=1))
     stated = np.isfinite(sigma)
     chi2 = good["est_chi2_tip"].to_numpy()[stated]
     roll = _column(good, "est_roll_error_deg")

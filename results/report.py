@@ -9,7 +9,7 @@ from typing import Any
 
 import jinja2
 
-from conespot.results.assumptions import assumptions, both_conventions, scene_of
+from conespot.results.assumptions import Assumptions, assumptions
 from conespot.results.figures import Drawing
 from conespot.results.light_exposure import light_exposures
 from conespot.results.paper_values import CITATION
@@ -65,6 +65,7 @@ def _facts(run: Run) -> list[tuple[str, str]]:
     facts += [
         ("rows", f"{len(frame)} (one per frame and localizer)"),
         ("poses", str(frame["pose"].nunique())),
+        *([("frames", str(len(frame[["frame", "pose"]].drop_duplicates())))] if "frame" in frame else []),
         ("failed", f"{failed} ({100.0 * failed / len(frame):.3g} %)"),
         ("power", f"{', '.join(powers[:20])}{' ...' if len(powers) > 20 else ''} W"),
     ]
@@ -81,15 +82,15 @@ def _powers(run: Run) -> Block | None:
     if run.rows is None:
         return None
     lines: dict[tuple[str, ...], None] = {}
-    for variant, part in split(run.rows.frame, run.rows.group):
-        scene = scene_of(run.scene, variant.setting)
-        edge = assumptions(run.scene, variant.setting).edge
-        for power in sorted(part["power_w"].unique()):
-            watts = both_conventions(scene, float(power))
-            if watts is not None:
-                numbers = (watts.isotropic_w, 1e3 * watts.flux_w, 1e3 * watts.axial_intensity)
-                lines[(f"{power:g}", edge, *map(number, numbers))] = None
-    header = ("power as stated [W]", "beam", "isotropic [W]", "flux from the tip [mW]", "on the axis [mW/sr]")
+    stated = run.rows.frame[["case", "power_w"]].drop_duplicates().sort_values("power_w", kind="stable")
+    for key, power in stated.itertuples(index=False):
+        case = run.cases.get(key)
+        if case is not None:
+            watts = case.watts
+            numbers = (watts.isotropic_w, 1e3 * watts.flux_w, 1e3 * watts.axial_intensity)
+            said = case.assumes
+            lines[(f"{power:g}", said.power_convention, said.edge, *map(number, numbers))] = None
+    header = ("power as stated [W]", "convention", "beam", "isotropic [W]", "flux from the tip [mW]", "on axis [mW/sr]")
     return Block("", header, tuple(lines)[:_MOST_LINES], ()) if lines else None
 
 
@@ -114,15 +115,17 @@ def _failures(run: Run) -> Block | None:
 
 
 def _assumption_sets(run: Run) -> Block | None:
+    """A line a variant, and one a surface where it has several."""
     if run.rows is None:
         return None
     lines: list[tuple[str, ...]] = []
-    names: tuple[str, ...] = ()
-    for variant, _ in split(run.rows.frame, run.rows.group)[:_MOST_LINES]:
-        columns = assumptions(run.scene, variant.setting).columns()
-        names = tuple(name.replace("_", " ") for name in columns)
-        lines.append((variant.label, *columns.values()))
-    return Block("", ("numbers of", *names), tuple(lines), ())
+    for variant, part in split(run.rows.frame, run.rows.group)[:_MOST_LINES]:
+        surfaces = ordered(part["surface"])
+        for surface in surfaces:
+            label = f"{variant.label}, {surface}" if len(surfaces) > 1 else variant.label
+            lines.append((label, *assumptions(run.cases, part[part["surface"] == surface]).columns().values()))
+    names = (name.replace("_", " ") for name in Assumptions().columns())
+    return Block("", ("numbers of", *names), tuple(lines[:_MOST_LINES]), ())
 
 
 def _versions(made_with: Any) -> list[tuple[str, str]]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import re
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
@@ -14,60 +15,23 @@ import pyarrow.csv
 import pyarrow.parquet
 from pandas.api.types import is_numeric_dtype
 
+from conespot.results.columns import COLUMNS, MAX_ROWS, SETTING, Column
 from conespot.scene import InputError
 
-NAMES = ("trajectory", "spotlights", "illumination", "surface", "sensor", "localizer")
-#: what makes rows comparable, in the order of design.md; swept keys follow it
-GROUP = ("trajectory", "spotlights", "power_w", "illumination", "surface", "sensor", "resolution_px", "localizer")
-METRICS = (
-    "position_error_mm",
-    "error_x_mm",
-    "error_y_mm",
-    "error_z_mm",
-    "error_rot_y_deg",
-    "error_rot_z_deg",
-    "rotation_error_deg",
-    "axis_error_deg",
-)
-_NEVER_NEGATIVE = ("position_error_mm", "rotation_error_deg", "axis_error_deg")
-_WHOLE = {"pose": 0, "resolution_px": 1}
-_TEXT = ("case", *NAMES, "status", "reason")
-_NUMBERS = (
-    "power_w",
-    "resolution_px",
-    "pose",
-    *(f"{kind}_{axis}_mm" for kind in ("true", "est", "error") for axis in "xyz"),
-    "position_error_mm",
-    "error_rot_y_deg",
-    "error_rot_z_deg",
-    "rotation_error_deg",
-    "axis_error_deg",
-)
-#: where estimators state sigmas: those, the tip's chi-squared, the share of the patch in the frame, the roll's error,
-#: the bound
-STATED = (
-    *(f"est_sigma_{axis}_mm" for axis in "xyz"),
-    "est_chi2_tip",
-    "true_in_frame",
-    "est_roll_error_deg",
-    "est_bound_mm",
-)
-COLUMNS = ("case", *GROUP, "pose", "status", "reason", *_NUMBERS[3:])
-
 _MAX_BYTES = 500_000_000
-_MAX_ROWS = 1_000_000
 _MAX_COLUMNS = 200
 _MAX_GROUPS = 50_000
 _MAX_TEXT = 1000
 _MAX_NAME = 200
 _LOCALIZER = re.compile(r"[\w .+-]{1,60}", re.ASCII)
+_NEEDED = tuple(c.name for c in COLUMNS if not c.optional)
+_TEXT = tuple(c.name for c in COLUMNS if c.kind == "text")
 
 
 @dataclass(frozen=True)
 class Rows:
-    """Validated rows. `frame` has the columns `COLUMNS`, those of `STATED` that the run has, then `swept`.
-
-    Numbers are float64, names text.
+    """Validated rows. `frame` has the declared columns in their order, of the optional ones those that the run has,
+    then `swept`. Numbers are float64, whole ones int64, names text.
     """
 
     frame: pd.DataFrame
@@ -76,7 +40,7 @@ class Rows:
     @property
     def group(self) -> tuple[str, ...]:
         """Columns that make rows comparable."""
-        return (*GROUP, *self.swept)
+        return (*SETTING, *self.swept)
 
     def __len__(self) -> int:
         return len(self.frame)
@@ -95,28 +59,29 @@ def read_rows(path: Path, swept: Iterable[str] = ()) -> Rows:
     read, is too large, lacks a column, has another one, or holds values of the wrong type or out of bounds.
     """
     keys = tuple(swept)
-    table = read_table(path, _MAX_ROWS, text=(*_TEXT, *keys))
-    missing = [name for name in COLUMNS if name not in table.column_names]
+    table = read_table(path, MAX_ROWS, text=(*_TEXT, *keys))
+    missing = [name for name in _NEEDED if name not in table.column_names]
     if missing:
-        raise InputError(f"{path}: no column {', '.join(missing)}; a run's rows have all of {', '.join(COLUMNS)}")
+        raise InputError(f"{path}: no column {', '.join(missing)}; a run's rows have all of {', '.join(_NEEDED)}")
+    declared = [c for c in COLUMNS if c.name in table.column_names]
+    known = {c.name for c in declared}
     extra: list[str] = []
     for name in table.column_names:
-        if name in COLUMNS or name in STATED or name.startswith("est_"):
+        if name in known or name.startswith("est_"):
             continue
         if "." not in name and name not in keys:
             raise InputError(f"{path}: unknown column '{name}'; a swept key's column is named by its dotted path")
         extra.append(name)
     data: dict[str, pd.Series] = {}
-    for name in COLUMNS:
-        data[name] = text_column(table, name, path) if name in _TEXT else number_column(table, name, path)
-    for name in (name for name in STATED if name in table.column_names):
-        data[name] = number_column(table, name, path)
+    for c in declared:
+        data[c.name] = (text_column if c.kind == "text" else number_column)(table, c.name, path)
     for name in extra:
         data[name] = _swept_column(table, name, path)
     rows = Rows(pd.DataFrame(data), tuple(extra))
-    _check(rows, path)
-    for name in _WHOLE:
-        rows.frame[name] = rows.frame[name].astype("int64")
+    _check(rows, declared, path)
+    for c in declared:
+        if c.kind == "whole":
+            rows.frame[c.name] = rows.frame[c.name].astype("int64")
     return rows
 
 
@@ -196,28 +161,47 @@ def _swept_column(table: pa.Table, name: str, path: Path) -> pd.Series:
     return numbers if bool(np.isfinite(numbers).all()) else words
 
 
-def _check(rows: Rows, path: Path) -> None:
+def _check(rows: Rows, declared: Sequence[Column], path: Path) -> None:
     frame = rows.frame
     _require(frame["status"].isin(("ok", "failed")), "status must be ok or failed", path)
     for name in rows.group:
         if not is_numeric_dtype(frame[name]):
             _check_names(frame[name].unique(), name, path)
-        else:
+        elif name in rows.swept:
             _require(np.isfinite(frame[name]), f"{name} must be a finite number", path)
-    _require(frame["power_w"] >= 0.0, "power_w must not be negative", path)
-    for name, least in _WHOLE.items():
-        whole = (frame[name] >= least) & (frame[name] == np.floor(frame[name])) & (frame[name] < 2**31)
-        _require(whole, f"{name} must be a whole number from {least}", path)
-    failed = frame["status"] == "failed"
-    for name in METRICS:
-        good = np.abs(frame[name]) < 1e9  # false for NaN
-        _require(good | failed, f"{name} must be a number where status is ok", path)
-        if name in _NEVER_NEGATIVE:
-            _require((frame[name] >= 0.0) | failed, f"{name} must not be negative", path)
+    for c in declared:
+        if c.kind != "text":
+            _check_numbers(frame, c, path)
     _require(~frame.duplicated(["case", "pose", *rows.group]), "the same case, pose and localizer stand twice", path)
     groups = len(frame.drop_duplicates(list(rows.group)))
     if groups > _MAX_GROUPS:
         raise InputError(f"{path}: {groups} different settings are more than results reads ({_MAX_GROUPS})")
+
+
+def _check_numbers(frame: pd.DataFrame, c: Column, path: Path) -> None:
+    """The column's bounds; an error must stand where a frame was localized, a truth or a sigma may be missing."""
+    values = frame[c.name]
+    inside = (values >= c.least) & (values <= c.most)  # false for NaN
+    match c.group:
+        case "error":
+            failed = frame["status"] == "failed"
+            _require(np.isfinite(values) | failed, f"{c.name} must be a number where status is ok", path)
+            inside |= failed
+        case "truth" | "answer" | "stated":
+            inside |= values.isna()
+        case _ if c.kind == "whole":
+            inside &= values == np.floor(values)
+        case _:
+            _require(np.isfinite(values), f"{c.name} must be a finite number", path)
+    _require(inside, f"{c.name} must {_bounds(c)}", path)
+
+
+def _bounds(c: Column) -> str:
+    if c.kind == "whole":
+        return f"be a whole number from {c.least:g}"
+    if c.least == 0.0 and math.isinf(c.most):
+        return "not be negative"
+    return f"be from {c.least:g} to {c.most:g}"
 
 
 def _check_names(names: Iterable[str], column: str, path: Path) -> None:

@@ -1,14 +1,17 @@
-"""A run folder, read: the resolved campaign, its rows, and the theory table if there is one."""
+"""A run folder, read: the resolved campaign, its cases, its rows, and the theory table if there is one."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pandas as pd
 
+from conespot.results.cases import Case, read_cases
+from conespot.results.columns import SETTING
 from conespot.results.rows import Rows, find_rows, number_column, read_rows, read_table
 from conespot.scene import InputError
 from conespot.scene.document import Document, read_document
@@ -20,12 +23,18 @@ VOLUME_COLUMN = "volume_distance_3d_um"
 
 @dataclass(frozen=True)
 class Run:
-    """What a run folder holds. `rows` or `theory` may be None, not both."""
+    """What a run folder holds, validated.
+
+    `rows.frame` is a table with a row a frame and localizer (conespot.results.columns says what its columns mean),
+    `cases` what the run says of each case of `rows.frame["case"]`, `theory` Table I. `rows` or `theory` may be None,
+    not both; `cases` is empty where the run describes none, as in version 0.1.0.
+    """
 
     folder: Path
     document: Document
     rows: Rows | None
     theory: pd.DataFrame | None
+    cases: Mapping[str, Case] = field(default_factory=dict)
 
     @property
     def name(self) -> str:
@@ -35,26 +44,28 @@ class Run:
 
     @property
     def scene(self) -> dict[str, Any]:
-        """The resolved scene as plain data."""
+        """The scene of the resolved campaign as plain data, before anything is swept; `cases` have each their own."""
         scene = self.document.data.get("scene")
         return scene if isinstance(scene, dict) else {}
 
 
-def load_run(folder: Path) -> Run:
+def load_run(folder: str | Path) -> Run:
     """Read and validate a run folder, one's own or somebody else's. Raises InputError."""
+    folder = Path(folder)
     if not folder.is_dir():
         raise InputError(f"{folder}: no such run folder; `campaign run NAME --out {folder}` makes one")
     resolved = folder / "campaign.yaml"
     if not resolved.is_file():
         raise InputError(f"{folder}: no campaign.yaml, so nothing says what the rows assume; copy the whole run folder")
     document = read_document(resolved)
+    cases = read_cases(folder)
     path = find_rows(folder)
-    rows = read_rows(path, _swept(document)) if path else None
+    rows = read_rows(path, [*_swept(document), *_swept_labels(cases)]) if path else None
     theory = folder / "theory.csv"
     table = _read_theory(theory) if theory.is_file() else None
     if table is None and (rows is None or len(rows) == 0):
         raise InputError(f"{folder}: holds no finished rows (errors.parquet or errors.csv); run the campaign first")
-    return Run(folder, document, rows if rows is not None and len(rows) else None, table)
+    return Run(folder, document, rows if rows is not None and len(rows) else None, table, cases)
 
 
 def _swept(document: Document) -> list[str]:
@@ -62,6 +73,11 @@ def _swept(document: Document) -> list[str]:
     sweep = document.data.get("sweep")
     products = sweep if isinstance(sweep, list) else [sweep]
     return [key for product in products if isinstance(product, dict) for key in product]
+
+
+def _swept_labels(cases: Mapping[str, Case]) -> list[str]:
+    """The labels that no standing column holds."""
+    return list(dict.fromkeys(name for case in cases.values() for name in case.labels if name not in SETTING))
 
 
 def _read_theory(path: Path) -> pd.DataFrame:

@@ -13,7 +13,8 @@ from typing import Any
 
 import pandas as pd
 
-from conespot.results.rows import GROUP
+from conespot.results.columns import SETTING, column
+from conespot.results.run import Run
 
 #: the paper's own axes, which lie inside a table or figure
 AXES = ("surface", "trajectory", "spotlights", "power_w")
@@ -50,6 +51,14 @@ def split(frame: pd.DataFrame, group: Sequence[str]) -> list[tuple[Variant, pd.D
     return found
 
 
+def paired(run: Run, boxes: pd.DataFrame) -> list[tuple[Variant, pd.DataFrame, pd.DataFrame]]:
+    """The variants of a run, each with its rows and its boxes."""
+    if run.rows is None:
+        return []
+    parts = zip(split(run.rows.frame, run.rows.group), split(boxes, run.rows.group), strict=True)
+    return [(variant, mine, stored) for (variant, mine), (_, stored) in parts]
+
+
 def ordered(values: pd.Series) -> list[Any]:
     """The distinct values: the paper's names first and in its order, then the rest sorted."""
     return sorted(values.unique(), key=lambda v: (_ORDER.get(v, len(_ORDER)), v))
@@ -64,6 +73,6 @@ def by_axes(frame: pd.DataFrame) -> Iterator[tuple[dict[str, Any], pd.DataFrame]
 
 def _named(name: str, value: Any) -> str:
     text = f"{value:g}" if isinstance(value, float) else str(value)
-    if name == "resolution_px":
-        return f"{text} px"
-    return text if name in GROUP else f"{name.removeprefix('scene.')} {text}"
+    if name not in SETTING:
+        return f"{name.removeprefix('scene.')} {text}"
+    return f"{text} {column(name).unit}".rstrip()

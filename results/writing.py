@@ -2,33 +2,30 @@
 
 from __future__ import annotations
 
-import re
 from pathlib import Path
 
 from conespot.results.boxes import box_table, encode_boxes, read_boxes
-from conespot.results.figures import draw_figures, plan_figures
+from conespot.results.figures import FIGURES, draw_figures, plan_figures
 from conespot.results.report import make_report
 from conespot.results.run import load_run
-from conespot.results.tables import make_tables
+from conespot.results.tables import TABLE_NAMES, make_tables
 from conespot.scene import InputError
 from conespot.scene.atomic import write_atomically
 
-_OURS = {
-    "tables": re.compile(r"(table_\d+|power|precision)\.csv|tables\.(txt|md)"),
-    "figures": re.compile(r"(figure_\d+|along|power)_.+\.(png|svg)"),
-}
-_TEXT = "tables.txt"
+_TEXT, _MARKDOWN = "tables.txt", "tables.md"
+_FOLDERS = ("tables", "figures")
 
 
-def write_results(run: Path) -> list[Path]:
+def write_results(run: str | Path) -> list[Path]:
     """Write box statistics, tables, figures and the report of a run folder; returns the files.
 
-    Reads errors.parquet (or errors.csv), campaign.yaml and theory.csv, nothing else. Tables and figures of an
-    earlier call that the rows no longer give are removed. Raises InputError for a folder that is no run, rows that
-    are not valid, and files that cannot be written.
+    Reads errors.parquet (or errors.csv), campaign.yaml, cases.jsonl and theory.csv, nothing else. Tables and figures
+    of an earlier call that the rows no longer give are removed. Raises InputError for a folder that is no run, rows
+    or cases that are not valid, and files that cannot be written.
     """
+    run = Path(run)
     found = load_run(run)
-    folders = {name: _folder(run / name) for name in _OURS}
+    folders = {name: _folder(run / name) for name in _FOLDERS}
     written: list[Path] = []
     boxes = None
     if found.rows is not None:
@@ -39,7 +36,7 @@ def write_results(run: Path) -> list[Path]:
     tables = make_tables(found, boxes)
     texts = {f"{table.name}.csv": table.frame.to_csv(index=False, float_format="%.9g") for table in tables}
     texts[_TEXT] = "\n\n".join(table.text() for table in tables)
-    texts["tables.md"] = "\n".join(table.markdown() for table in tables)
+    texts[_MARKDOWN] = "\n".join(table.markdown() for table in tables)
     for name, text in texts.items():
         write_atomically(folders["tables"] / name, text.encode())
         written.append(folders["tables"] / name)
@@ -51,9 +48,9 @@ def write_results(run: Path) -> list[Path]:
     return [*written, report]
 
 
-def tables_text(run: Path) -> str:
+def tables_text(run: str | Path) -> str:
     """The tables that `write_results` wrote, as text for the terminal. Raises InputError if there are none."""
-    path = run / "tables" / _TEXT
+    path = Path(run) / "tables" / _TEXT
     try:
         return path.read_text(encoding="utf-8")
     except (OSError, UnicodeDecodeError):
@@ -71,7 +68,10 @@ def _folder(path: Path) -> Path:
 
 
 def _clear(folders: dict[str, Path], written: list[Path]) -> None:
-    for name, folder in folders.items():
-        for path in folder.iterdir():
-            if _OURS[name].fullmatch(path.name) and path not in written:
-                path.unlink()
+    """Remove what an earlier report made and this one does not, and nothing else."""
+    tables = {_TEXT, _MARKDOWN, *(f"{name}.csv" for name in TABLE_NAMES)}
+    stale = [path for path in folders["tables"].iterdir() if path.name in tables]
+    stale += [path for path in folders["figures"].iterdir() if any(kind.made(path.name) for kind in FIGURES.values())]
+    for path in stale:
+        if path not in written:
+            path.unlink()

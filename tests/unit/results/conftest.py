@@ -1,6 +1,8 @@
-"""A run folder without a renderer: rows with known errors, a resolved campaign, and Table I."""
+"""A run folder without a renderer: rows with known errors, a resolved campaign, its cases, and Table I."""
 
 import itertools
+import json
+from dataclasses import asdict
 from pathlib import Path
 
 import numpy as np
@@ -9,8 +11,12 @@ import pytest
 from ruamel.yaml import YAML
 
 from conespot.results import style
-from conespot.results.rows import COLUMNS
+from conespot.results.columns import COLUMNS
+from conespot.scene import Scene, load_scene
 from conespot.scene.document import read_document, shipped
+from conespot.scene.illumination import LIGHTS
+from conespot.scene.surface import SURFACES
+from conespot.scene.words import assumed
 
 POWERS = (0.05, 0.1, 0.15, 0.25, 0.5, 0.75, 1.0)
 
@@ -79,13 +85,60 @@ def rows(
         part["error_rot_y_deg"], part["error_rot_z_deg"] = np.where(ok[:, None], turn, np.nan).T
         part["rotation_error_deg"] = np.hypot(part["error_rot_y_deg"], part["error_rot_z_deg"])
         part["axis_error_deg"] = 0.7 * part["rotation_error_deg"]
-        frame = pd.DataFrame(part)[list(COLUMNS)]
+        frame = pd.DataFrame(part)[[column.name for column in COLUMNS if column.name in part]]
         parts.append(frame.assign(**dict(zip(swept, values, strict=True))))
     return pd.concat(parts, ignore_index=True)
 
 
-def write_run(folder: Path, frame=None, *, document=None, theory=False, kind="parquet") -> Path:
+def cases(frame, scene_of=None):
+    """A description of every case in the rows; `scene_of` makes its scene from one of them, else from paper-code."""
+    found = []
+    for key, mine in frame.groupby("case", sort=False):
+        row = mine.iloc[0].to_dict()
+        scene = (scene_of or default_scene)(row)
+        standing = ("trajectory", "spotlights", "power_w", "illumination", "surface", "sensor", "resolution_px")
+        swept = [name for name in frame if name not in {column.name for column in COLUMNS} and name[:4] != "est_"]
+        words = {"threshold": "fixed 50 of 255 after median 9", "ambiguity": "RCM for one spotlight"}
+        found.append(
+            {
+                "schema": 1,
+                "key": key,
+                "frame": row.get("frame", key),
+                "labels": {name: row[name] for name in (*standing, *swept)},
+                "localizers": {name: words for name in mine["localizer"].unique()},
+                "assumes": assumed(scene),
+                "watts": asdict(scene.power.both(scene.beam)),
+                "told": {"rcm_sigma": "0.05 mm"},
+                "trajectory": {"kind": row["trajectory"]},
+                "poses": len(mine),
+                "samples": 16,
+                "edge_samples": 0,
+                "bounds": False,
+                "scene": scene.model_dump(mode="json"),
+            }
+        )
+    return found
+
+
+def default_scene(row):
+    scene = load_scene("paper-code").model_dump()
+    known = SURFACES.get(row["surface"], SURFACES["smooth"])
+    light = LIGHTS.get(row["illumination"], LIGHTS["white"])
+    return Scene(**{**scene, "surface": known, "illumination": light, "power": {"value": float(row["power_w"])}})
+
+
+def write_cases(folder, described):
+    lines = (json.dumps(case, default=lambda number: number.item()) for case in described)
+    (folder / "cases.jsonl").write_text("".join(f"{line}\n" for line in lines))
+
+
+def write_run(folder: Path, frame=None, *, document=None, described=None, theory=False, kind="parquet") -> Path:
+    """A run folder; `described` are its cases, none of them with an empty list."""
     folder.mkdir(parents=True, exist_ok=True)
+    if frame is not None and described is None:
+        described = cases(frame)
+    if described:
+        write_cases(folder, described)
     with (folder / "campaign.yaml").open("w") as stream:
         YAML(typ="safe", pure=True).dump(document or campaign(), stream)
     if frame is not None and kind == "parquet":
@@ -111,6 +164,11 @@ def coarse_figures():
 @pytest.fixture(scope="session")
 def make_campaign():
     return campaign
+
+
+@pytest.fixture(scope="session")
+def make_cases():
+    return cases
 
 
 @pytest.fixture(scope="session")

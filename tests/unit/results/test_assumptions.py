@@ -1,105 +1,95 @@
-"""results.assumptions: every number says what it assumes, row by row."""
+"""results.assumptions: every number says what it assumes, as the run's own cases say it."""
 
-import math
-
+import pandas as pd
 import pytest
 
-from conespot.results.assumptions import Assumptions, assumptions, both_conventions, scene_of
-from conespot.scene import load_scene
+from conespot.results.assumptions import Assumptions, assumptions, power_in_words, watts_of
+from conespot.results.cases import Case
+from conespot.scene import Scene, load_scene
+from conespot.scene.beam import CyclesBeam, HardBeam
+from conespot.scene.sensor import SENSORS
 
 
-@pytest.fixture
-def scene(make_campaign):
-    return make_campaign()["scene"]
+def described(make_cases, frame, scene_of=None):
+    return {case["key"]: Case.model_validate(case) for case in make_cases(frame, scene_of)}
 
 
-def test_the_preset_as_coded(scene):
-    assert assumptions(scene, {"localizer": "paper-code", "sensor": "srgb8"}) == Assumptions(
+def scene_with(**parts):
+    return Scene(**{**load_scene("paper-code").model_dump(), **parts})
+
+
+def test_the_preset_as_coded(make_cases, make_rows):
+    frame = make_rows(poses=2)
+    assert assumptions(described(make_cases, frame), frame) == Assumptions(
         radius="12.5 mm",
         edge="Cycles blend 1 (fully soft), half angle 9 deg",
         power_convention="isotropic (I0 = P / 4 pi)",
         transfer="sRGB, 8 bit, white 1 W/m2/sr",
-        threshold="fixed 50 of 255 after median 9, outline cut to whole pixels",
-        ambiguity="RCM for one spotlight, least spread for several",
+        surface_shape="smooth",
+        threshold="fixed 50 of 255 after median 9",
+        ambiguity="RCM for one spotlight",
     )
 
 
-def test_an_oracle_says_that_it_is_one(scene):
-    assert "truth" in assumptions(scene, {"localizer": "paper-code-oracle"}).ambiguity
-    assert assumptions(scene, {"localizer": "paper"}).threshold.startswith("Otsu")
-
-
-def test_swept_values_overrule_the_scene(scene):
-    found = assumptions(
-        scene,
-        {
-            "localizer": "cone",
-            "eye.radius": "11 mm",
-            "beam.kind": "hard",
-            "beam.half_angle": "7 deg",
-            "scene.power.convention": "flux",
-            "sensor": "linear",
-        },
+def test_a_sweep_over_whole_beams_states_edge_convention_and_watts_of_each(make_cases, make_rows):
+    """Two beams named by their text in a column, under a stated flux; against the words of either."""
+    beams = {"{kind: hard}": HardBeam(), "{kind: cycles}": CyclesBeam(half_angle=0.2)}
+    frame = make_rows(poses=2, powers=(0.003,), swept={"scene.beam": tuple(beams)})
+    cases = described(
+        make_cases,
+        frame,
+        lambda row: scene_with(beam=beams[row["scene.beam"]], power={"value": row["power_w"], "convention": "flux"}),
     )
-    assert (found.radius, found.edge, found.transfer) == ("11 mm", "hard, half angle 7 deg", "linear")
-    assert found.power_convention.startswith("flux")
+    for text, beam in beams.items():
+        rows = frame[frame["scene.beam"] == text]
+        found = assumptions(cases, rows)
+        assert (found.edge, found.power_convention) == (beam.words, "flux (P leaves the tip)")
+        assert watts_of(cases, rows).flux_w == pytest.approx(0.003)
+        assert "(3 mW flux)" in power_in_words(cases, rows)
+    assert assumptions(cases, frame).edge == " or ".join(beam.words for beam in beams.values())
+    assert watts_of(cases, frame) is None
 
 
-def test_a_swept_preset_is_filled_in():
-    radius = {name: assumptions({}, {"scene": name, "localizer": "x"}).radius for name in ("paper", "paper-code")}
-    assert radius == {"paper": "12 mm", "paper-code": "12.5 mm"}
-    assert scene_of({"preset": "paper", "eye": {"radius": "11 mm"}}, {})["eye"] == {"radius": "11 mm"}
+def test_bumps_are_no_smooth_eye_and_a_camera_is_more_than_its_kind(make_cases, make_rows):
+    frame = make_rows(poses=2, powers=(1.0,), surfaces=("smooth", "bumps")).assign(sensor="emva")
+    camera = SENSORS["cmv12000-nir"]
+    surfaces = {"smooth": "smooth", "bumps": "15 bumps (0.5 mm across, 0.1 mm high)"}
+    cases = described(make_cases, frame, lambda row: scene_with(surface=row["surface"], sensor=camera))
+    for surface, words in surfaces.items():
+        found = assumptions(cases, frame[frame["surface"] == surface])
+        assert (found.surface_shape, found.transfer) == (words, camera.words)
+    assert assumptions(cases, frame).surface_shape == "smooth or 15 bumps (0.5 mm across, 0.1 mm high)"
 
 
-def test_a_preset_that_is_a_file_is_not_opened(tmp_path):
-    (tmp_path / "mine.yaml").write_text("eye: {radius: 11 mm}")
-    assert assumptions({}, {"scene": str(tmp_path / "mine.yaml"), "localizer": "x"}).radius == "not stated"
+def test_a_run_that_states_nothing_is_said_to(make_rows):
+    frame = make_rows(poses=2, powers=(1.0,))
+    assert set(assumptions({}, frame).columns().values()) == {"not stated"}
+    assert power_in_words({}, frame) == "1 W (convention not stated)"
+    assert watts_of({}, frame) is None
 
 
-@pytest.mark.parametrize(
-    ("beam", "said"),
-    [
-        ({"kind": "hard", "half_angle": "9 deg"}, "hard, half angle 9 deg"),
-        ({"kind": "cycles", "half_angle": "9 deg", "blend": 0.15}, "Cycles blend 0.15, half angle 9 deg"),
-        ({"kind": "linear", "half_angle": "9 deg", "beam_width": "5 deg"}, "linear from 5 deg, half angle 9 deg"),
-        ({"kind": "table", "angles": ["0 deg", "8 deg"], "intensities": [1, 0]}, "tabulated, half angle 8 deg"),
-        ("{kind: hard}", "{kind: hard}"),
-        ({"kind": "laser"}, "laser"),
-        (None, "not stated"),
-        ([1, 2], "not stated"),
-    ],
-)
-def test_every_edge_profile_has_words(beam, said):
-    assert assumptions({"beam": beam}, {}).edge == said
+def test_a_case_left_out_is_not_covered_by_the_others(make_cases, make_rows):
+    frame = make_rows(poses=2, powers=(1.0,), trajectories=("box",))
+    cases = described(make_cases, frame)
+    del cases[frame["case"].iloc[0]]
+    assert assumptions(cases, frame).radius == "not stated or 12.5 mm"
+    assert watts_of(cases, frame) is None
 
 
-def test_a_run_that_states_nothing_is_said_to(scene):
-    found = assumptions({}, {"localizer": "mine"})
-    assert (found.radius, found.edge, found.transfer) == ("not stated",) * 3
-    assert found.threshold == "see mine"
+def test_a_localizer_that_the_case_does_not_know_states_nothing(make_cases, make_rows):
+    frame = make_rows(poses=2, powers=(1.0,))
+    found = assumptions(described(make_cases, frame), frame.assign(localizer="mine"))
+    assert (found.threshold, found.radius) == ("not stated", "12.5 mm")
 
 
-def test_one_isotropic_watt_is_three_milliwatts_of_flux(scene):
-    watts = both_conventions(scene, 1.0)
-    assert watts.axial_intensity == pytest.approx(1.0 / (4.0 * math.pi))
-    # (P / 2) (1 - cos b) (1 - blend / 2)
-    assert watts.flux_w == pytest.approx(0.5 * (1.0 - math.cos(math.radians(9.0))) * 0.5)
-    assert watts.isotropic_w == pytest.approx(1.0)
-    assert watts.words() == "1 W isotropic (3.08 mW flux)"
+def test_many_different_ones_are_named_in_part(make_cases, make_rows):
+    frame = make_rows(poses=1, powers=(1.0,), swept={"eye.radius": tuple(f"{r} mm" for r in range(10, 18))})
+    cases = described(make_cases, frame, lambda row: scene_with(eye={"radius": float(row["eye.radius"][:2])}))
+    assert assumptions(cases, frame).radius == "10 mm or 11 mm or 12 mm or 13 mm or 4 others"
 
 
-def test_the_conventions_are_each_others_inverse(scene):
-    flux = {**scene, "power": {"value": "1 W", "convention": "flux"}}
-    there = both_conventions(scene, 0.25).flux_w
-    assert both_conventions(flux, there).isotropic_w == pytest.approx(0.25)
-    assert both_conventions(flux, there).flux_w == pytest.approx(there)
-
-
-def test_power_agrees_with_the_scene_room(scene):
-    power = load_scene("paper-code").power
-    assert both_conventions(scene, power.value).flux_w == pytest.approx(power.flux(load_scene("paper-code").beam))
-
-
-def test_without_a_beam_or_a_convention_there_is_no_flux(scene):
-    assert both_conventions({}, 1.0) is None
-    assert both_conventions({"beam": scene["beam"], "power": {"convention": "lumen"}}, 1.0) is None
+def test_the_order_of_the_rows_does_not_decide_what_is_stated(make_cases, make_rows):
+    frame = make_rows(poses=2, powers=(1.0,), surfaces=("smooth", "bumps"))
+    cases = described(make_cases, frame)
+    words = {assumptions(cases, pd.DataFrame(part)).surface_shape for part in (frame, frame.iloc[::-1])}
+    assert all("smooth" in text and "15 bumps" in text for text in words)

@@ -10,7 +10,8 @@ from matplotlib.cbook import boxplot_stats
 from pandas.api.types import is_numeric_dtype
 
 from conespot.results.boxes import STATISTICS, box_statistics, box_table, encode_boxes, read_boxes
-from conespot.results.rows import GROUP, METRICS, Rows
+from conespot.results.columns import METRICS, SETTING
+from conespot.results.rows import Rows
 
 values = st.lists(st.floats(-1e6, 1e6), min_size=1, max_size=60)
 
@@ -63,7 +64,7 @@ def test_without_a_localized_frame_there_are_failures_and_no_numbers():
 def test_every_frame_is_counted_once_in_every_box(make_rows):
     frame = make_rows(poses=12, failing=0.3)
     boxes = box_table(Rows(frame))
-    assert list(boxes.columns) == [*GROUP, "metric", *STATISTICS]
+    assert list(boxes.columns) == [*SETTING, "metric", *STATISTICS]
     assert (boxes["n"] + boxes["failed"] == 12).all()
     assert len(boxes) == len(METRICS) * 2 * 2 * 7
     assert boxes["failed"].sum() == len(METRICS) * (frame["status"] == "failed").sum()
@@ -90,6 +91,13 @@ def test_the_file_reads_back_as_it_was_written(tmp_path, make_rows):
             assert list(again[name]) == list(boxes[name])
         else:
             np.testing.assert_allclose(again[name].to_numpy(float), boxes[name].to_numpy(float), rtol=1e-8)
+
+
+def test_powers_that_differ_by_little_stay_apart(tmp_path, make_rows):
+    rows = Rows(make_rows(poses=3, trajectories=("box",), powers=(0.1, 0.1 + 2e-16, 0.1 + 1e-12, 1.0)))
+    boxes = box_table(rows)
+    (tmp_path / "boxes.csv").write_bytes(encode_boxes(boxes))
+    assert read_boxes(tmp_path / "boxes.csv", rows)["power_w"].tolist() == boxes["power_w"].tolist()
 
 
 def test_a_box_of_failures_reads_back_as_one(tmp_path, make_rows):

@@ -18,7 +18,7 @@ def two_lights(make_rows):
 
     def make(shift_mm=-0.004, scatter=0.003, poses=30, seed=1, **settings):
         white = make_rows(poses=poses, trajectories=("box",), rigs=("single",), powers=(0.25, 1.0), **settings)
-        infrared = white.assign(illumination="ir850", case="ir" + white["case"])
+        infrared = white.assign(illumination="ir850", case="1" + white["case"].str[1:])
         change = shift_mm + np.random.default_rng(seed).normal(0.0, scatter, len(white))
         infrared["position_error_mm"] = np.maximum(white["position_error_mm"] + change, 1e-6)
         return white.assign(illumination="led-b3"), infrared
@@ -109,6 +109,7 @@ def test_a_run_gets_text_table_and_figures_with_its_exposures(two_lights, make_r
     text = compare_runs([folder])
     assert (folder / "comparison.txt").read_text() == text
     assert "ir850: peak retinal irradiance" in text
+    assert "ir850 assumes: radius: 12.5 mm; edge: Cycles blend 1 (fully soft), half angle 9 deg; power conv" in text
     assert "2007 edition, research estimate, not a safety assessment" in text
     assert {"median_mm", "p", "pairs", "failed_a"} <= set(pd.read_csv(folder / "tables" / "comparison.csv").columns)
     assert len(list((folder / "figures").glob("comparison_ir850_led-b3_*"))) == 2

@@ -5,8 +5,11 @@ import xml.etree.ElementTree as ET
 
 import numpy as np
 import pytest
+from matplotlib.figure import Figure
 
+from conespot.results import figures, write_results
 from conespot.results.boxes import box_table
+from conespot.results.figure_kind import FigureKind
 from conespot.results.figures import draw_figures, plan_figures
 from conespot.results.pose_figure import pose_figure
 from conespot.results.power_figure import power_figure
@@ -52,6 +55,37 @@ def test_captions_state_whiskers_failures_power_and_assumptions(plan, make_rows)
         assert "paper-code" in drawing.title
         if drawing.title.startswith("Fig. 1"):
             assert "1.5 interquartile ranges (Tukey)" in drawing.caption
+
+
+class Largest(FigureKind):
+    """A kind as docs/extending.md shows one: a name, a caption and a drawing."""
+
+    name = "largest"
+    what = "Largest errors,"
+
+    def caption(self, cut):
+        return cut.assumed
+
+    def draw(self, cut, title, caption):
+        figure = Figure()
+        figure.subplots().barh(cut.boxes["metric"], cut.boxes["max"])
+        return figure
+
+
+def test_another_kind_is_drawn_and_cleared_by_its_name_alone(tmp_path, make_run, make_rows, monkeypatch):
+    folder = make_run(tmp_path / "run", make_rows(poses=2, powers=(1.0,), trajectories=("box",), rigs=("single",)))
+    (folder / "figures").mkdir()
+    (folder / "figures" / "mine_box.png").touch()
+    with monkeypatch.context() as patch:
+        patch.setitem(figures.FIGURES, "largest", Largest())
+        assert {path.name for path in write_results(folder) if path.name.startswith("largest")} == {
+            f"largest_box_smooth_paper-code.{kind}" for kind in ("png", "svg")
+        }
+        (folder / "figures" / "largest_helix_smooth_paper-code.svg").touch()
+        write_results(folder)
+    names = {path.name for path in (folder / "figures").iterdir()}
+    assert "largest_helix_smooth_paper-code.svg" not in names
+    assert {"largest_box_smooth_paper-code.svg", "mine_box.png"} < names
 
 
 def test_names_that_differ_in_punctuation_get_files_of_their_own(plan, make_rows):

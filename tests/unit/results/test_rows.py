@@ -5,9 +5,12 @@ import pandas as pd
 import pytest
 
 from conespot.results import rows as rows_module
-from conespot.results.rows import COLUMNS, GROUP, read_rows
+from conespot.results.columns import COLUMNS, SETTING
+from conespot.results.rows import read_rows
 from conespot.results.run import load_run
 from conespot.scene import InputError
+
+NEEDED = [column.name for column in COLUMNS if not column.optional]
 
 
 @pytest.fixture
@@ -19,7 +22,7 @@ def frame(make_rows):
 def refused(tmp_path, make_run):
     def check(frame, kind="parquet"):
         with pytest.raises(InputError) as caught:
-            load_run(make_run(tmp_path / "run", frame, kind=kind))
+            load_run(make_run(tmp_path / "run", frame, described=[], kind=kind))
         message = str(caught.value)
         assert "\n" not in message
         assert str(tmp_path) in message
@@ -36,8 +39,15 @@ def test_parquet_and_csv_give_the_same_rows(tmp_path, frame, make_run):
     two = load_run(make_run(tmp_path / "b", frame, kind="csv")).rows
     pd.testing.assert_frame_equal(one.frame, two.frame)
     assert one.swept == two.swept == ("beam.half_angle", "retina.detail")
-    assert one.group == (*GROUP, "beam.half_angle", "retina.detail")
-    assert list(one.frame.columns) == [*COLUMNS, "est_sigma_x_mm", *one.swept]
+    assert one.group == (*SETTING, "beam.half_angle", "retina.detail")
+    assert list(one.frame.columns) == [*NEEDED, "est_sigma_x_mm", *one.swept]
+
+
+def test_the_frame_column_may_be_missing_as_in_version_0_1_0(tmp_path, frame, make_run):
+    assert "frame" not in load_run(make_run(tmp_path / "old", frame)).rows.frame
+    named = load_run(make_run(tmp_path / "new", frame.assign(frame=frame["case"]), kind="csv")).rows
+    assert (named.frame["frame"] == named.frame["case"]).all()
+    assert named.group == SETTING
 
 
 def test_parquet_is_read_where_both_stand(tmp_path, frame, make_run):
@@ -88,6 +98,9 @@ def test_a_swept_column_without_a_dot_is_known_from_the_campaign(tmp_path, frame
         ("localizer", "../../etc", "'../../etc' is no localizer's name"),
         ("localizer", "<script>", "'<script>' is no localizer's name"),
         ("reason", "x" * 2000, "a text of 2000 characters"),
+        ("frame", 7, "not text"),
+        ("true_in_frame", 1.5, "row 1: true_in_frame must be from 0 to 1"),
+        ("est_sigma_x_mm", -0.1, "row 1: est_sigma_x_mm must not be negative"),
         ("power_w", "1 W", "not numbers"),
         ("trajectory", 7, "not text"),
     ],
@@ -128,7 +141,7 @@ def test_garbage_is_refused(tmp_path, name, content, make_run):
 @pytest.mark.parametrize(
     ("bound", "said"),
     [
-        ("_MAX_ROWS", "32 rows of 26 columns are more"),
+        ("MAX_ROWS", "32 rows of 26 columns are more"),
         ("_MAX_COLUMNS", "32 rows of 26 columns are more"),
         ("_MAX_BYTES", "larger than"),
         ("_MAX_GROUPS", "8 different settings are more"),

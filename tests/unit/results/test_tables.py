@@ -7,11 +7,12 @@ import pandas as pd
 import pytest
 
 from conespot.results.boxes import box_table
+from conespot.results.error_tables import reference_power
 from conespot.results.run import Run, load_run
 from conespot.results.table import Block, Table
-from conespot.results.tables import make_tables, reference_power
+from conespot.results.tables import make_tables
 
-ASSUMED = ["radius", "edge", "power_convention", "transfer", "threshold", "ambiguity"]
+ASSUMED = ["radius", "edge", "power_convention", "transfer", "surface_shape", "threshold", "ambiguity"]
 
 
 @pytest.fixture
@@ -57,7 +58,7 @@ def test_every_number_has_its_assumption_set(tables_of, make_rows):
     made = tables_of(make_rows(poses=4, surfaces=("smooth", "bumps")), theory=True)
     assert list(made) == ["table_1", "table_4", "table_5", "power"]
     for table in made.values():
-        assert list(table.frame.columns[-6:]) == ASSUMED
+        assert list(table.frame.columns[-7:]) == ASSUMED
         assert table.frame[ASSUMED].map(bool).all().all()
         assert all("Assumes: radius: 1" in block.notes[-1] for block in table.blocks)
 
@@ -72,6 +73,27 @@ def test_table_v_compares_bumps_with_the_paper_and_with_smooth(tables_of, make_r
     assert row["ours"] == pytest.approx(bumps["position_error_mm"].max())
     assert row["over_smooth"] == pytest.approx(bumps["position_error_mm"].max() / smooth["position_error_mm"].max())
     assert row["published_over_smooth"] == pytest.approx(0.210 / 0.137)
+
+
+def test_bumps_are_stated_beside_their_numbers_and_nowhere_else(tables_of, make_rows):
+    made = tables_of(make_rows(poses=4, surfaces=("smooth", "bumps"), powers=(1.0,)))
+    bumps = "15 bumps (0.5 mm across, 0.1 mm high)"
+    assert set(made["table_4"].frame["surface_shape"]) == {"smooth"}
+    assert set(made["table_5"].frame["surface_shape"]) == {bumps}
+    power = made["power"].frame
+    assert (power["surface_shape"].eq(bumps) == power["surface"].eq("bumps")).all()
+    for name, words in {"table_4": "smooth", "table_5": bumps, "power": f"smooth or {bumps}"}.items():
+        assert f"surface shape: {words};" in made[name].blocks[0].notes[-1]
+
+
+def test_a_run_that_describes_no_cases_says_so_beside_every_number(tables_of, make_rows):
+    made = tables_of(make_rows(poses=4, surfaces=("smooth", "bumps")), described=[])
+    assert set(made) == {"table_4", "table_5", "power"}
+    for table in made.values():
+        assert (table.frame[ASSUMED] == "not stated").all().all()
+        assert "edge: not stated; power convention: not stated" in table.text()
+    assert "at 1 W (convention not stated)" in made["table_4"].blocks[0].heading
+    assert made["power"].frame["flux_w"].isna().all()
 
 
 def test_table_v_stands_without_a_smooth_run(tables_of, make_rows):
@@ -113,9 +135,12 @@ def test_without_one_watt_the_highest_power_stands_in_and_is_stated(tables_of, m
     assert math.isnan(reference_power(set()))
 
 
-def test_settings_are_never_pooled(tables_of, make_rows):
+def test_settings_are_never_pooled(tables_of, make_rows, make_cases):
     frame = make_rows(poses=4, powers=(1.0,), swept={"beam.half_angle": ("7 deg", "9 deg")})
-    table = tables_of(frame)["table_4"]
+    described = make_cases(frame)
+    for case in described:
+        case["assumes"]["edge"] = f"hard, half angle {case['labels']['beam.half_angle']}"
+    table = tables_of(frame, described=described)["table_4"]
     assert [b.heading.split(", at")[0] for b in table.blocks] == [
         "paper-code, beam.half_angle 7 deg",
         "paper-code, beam.half_angle 9 deg",

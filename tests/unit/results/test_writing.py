@@ -20,7 +20,7 @@ from conespot.scene import InputError
 def written(tmp_path_factory, make_run, make_rows):
     smooth = make_rows(poses=6, powers=(0.25, 1.0), failing=0.2)
     bumps = make_rows(poses=6, powers=(1.0,), trajectories=("helix",), surfaces=("bumps",), failing=0.2)
-    frame = pd.concat([smooth, bumps.assign(case="bumps")], ignore_index=True)
+    frame = pd.concat([smooth, bumps.assign(case="b" + bumps["case"].str[1:])], ignore_index=True)
     folder = make_run(tmp_path_factory.mktemp("run"), frame, theory=True)
     return folder, write_results(folder)
 
@@ -45,14 +45,14 @@ def test_a_run_folder_gets_every_file_and_no_other(written):
         | {f"figures/{f}_paper-code.{kind}" for f in figures for kind in ("png", "svg")}
     )
     on_disk = {os.path.relpath(os.path.join(d, f), folder) for d, _, found in os.walk(folder) for f in found}
-    assert on_disk == names | {"campaign.yaml", "errors.parquet", "theory.csv"}
+    assert on_disk == names | {"campaign.yaml", "cases.jsonl", "errors.parquet", "theory.csv"}
     assert all(path.stat().st_size > 0 for path in files)
 
 
 def test_somebody_elses_copy_with_csv_rows_gives_the_same_bytes(written, tmp_path):
     folder, files = written
     pd.read_parquet(folder / "errors.parquet").to_csv(tmp_path / "errors.csv", index=False)
-    for name in ("campaign.yaml", "theory.csv"):
+    for name in ("campaign.yaml", "cases.jsonl", "theory.csv"):
         shutil.copy(folder / name, tmp_path)
     again = write_results(tmp_path)
     assert [path.relative_to(tmp_path) for path in again] == [path.relative_to(folder) for path in files]
@@ -99,14 +99,17 @@ def test_the_failures_in_the_report_add_up(written):
     assert sum(int(line[5]) for line in lines) == failed > 0
 
 
-def test_hostile_text_stays_text(tmp_path, make_run, make_rows, make_campaign):
+def test_hostile_text_stays_text(tmp_path, make_run, make_rows, make_cases, make_campaign):
     evil = "<script>alert(1)</script>{{ 7*7 }}"
     frame = make_rows(poses=2, powers=(1.0,), trajectories=("box",), failing=0.5)
     frame.loc[frame["status"] == "failed", "reason"] = evil
     frame["illumination"] = evil
     document = make_campaign(name=evil, description=evil, made_with={evil: evil})
-    document["scene"]["eye"] = {"radius": evil}
-    folder = make_run(tmp_path / "run", frame, document=document)
+    described = make_cases(frame)
+    for case in described:
+        case["assumes"] = dict.fromkeys(case["assumes"], evil)
+        case["localizers"] = {name: {"threshold": evil, "ambiguity": evil} for name in case["localizers"]}
+    folder = make_run(tmp_path / "run", frame, document=document, described=described)
     write_results(folder)
     text = (folder / "report.html").read_text()
     assert "script" not in {tag for tag, _ in Tags(text).found}
@@ -118,7 +121,8 @@ def test_hostile_text_stays_text(tmp_path, make_run, make_rows, make_campaign):
 @pytest.mark.parametrize("scene", [None, [], "paper", {"beam": 3, "eye": [], "power": None, "sensor": {"kind": {}}}])
 def test_a_campaign_that_describes_no_scene_still_gives_results(tmp_path, make_run, make_rows, make_campaign, scene):
     frame = make_rows(poses=2, powers=(1.0,), trajectories=("box",), rigs=("single",))
-    folder = make_run(tmp_path / "run", frame, document=make_campaign(scene=scene, sweep=None, name=7, made_with=[1]))
+    document = make_campaign(scene=scene, sweep=None, name=7, made_with=[1])
+    folder = make_run(tmp_path / "run", frame, document=document, described=[])
     write_results(folder)
     assert "not stated" in tables_text(folder)
 

@@ -1,0 +1,139 @@
+"""What a report says its numbers assume, for README's example and every shipped campaign, case by case.
+
+The campaigns are planned, described and written as run folders with one pose a case and answers that are made up;
+nothing is rendered. Against convention, edge and surface of the scenes that the plan would render.
+"""
+
+import math
+import re
+from pathlib import Path
+
+import pandas as pd
+import pytest
+
+from conespot.campaigns.description import description_lines
+from conespot.campaigns.plan import make_plan
+from conespot.campaigns.row import Finding, Record, rows
+from conespot.campaigns.schema import makes_frames, override, read_campaign, resolved
+from conespot.results.boxes import box_table
+from conespot.results.columns import COLUMNS, SETTING
+from conespot.results.figures import plan_figures
+from conespot.results.paper_values import BOTH
+from conespot.results.run import load_run
+from conespot.results.tables import make_tables
+from conespot.scene.document import dump, shipped
+
+README = Path(__file__).parents[2] / "README.md"
+CAMPAIGNS = [name for name in sorted(shipped("campaigns", "")) if makes_frames(read_campaign(name))]
+EDGES = {"hard": "hard", "cycles": "Cycles blend", "linear": "linear", "table": "tabulated"}
+
+
+def example():
+    (text,) = re.findall(r"```yaml\n(name: half_angles\n.*?)```", README.read_text(), re.S)
+    return text
+
+
+def answered(group, pose):
+    """A record in which every localizer is off by 4 um; the estimators say so."""
+    truth = group.pose(pose)
+    findings = []
+    for case in group.cases:
+        for name in case.localizers:
+            stated = {"covariance": [[1e-5 * (i == j) for j in range(5)] for i in range(5)]} if name == "cone" else {}
+            apex = tuple(float(v) for v in truth.apex + [0.0, 0.0, 0.004])
+            findings.append(Finding(case=case.key, localizer=name, apex=apex, axis=tuple(truth.axis), **stated))
+    return Record(unit=group.unit(pose), findings=tuple(findings))
+
+
+@pytest.fixture(scope="module", params=["README", *CAMPAIGNS])
+def written(request, tmp_path_factory):
+    """The plan of a campaign, its run, and the boxes of that."""
+    folder = tmp_path_factory.mktemp("run")
+    name = request.param
+    if name == "README":
+        (folder / "half_angles.yaml").write_text(example())
+        name = str(folder / "half_angles.yaml")
+    document = override(read_campaign(name), "poses", "1", "--poses")
+    plan = make_plan(document)
+    records = {group.unit(0): answered(group, 0) for group in plan.groups}
+    (folder / "campaign.yaml").write_text(dump(resolved(document, {})))
+    (folder / "cases.jsonl").write_bytes(description_lines(plan))
+    pd.DataFrame(list(rows(plan, records))).to_parquet(folder / "errors.parquet", index=False)
+    run = load_run(folder)
+    return plan, run, box_table(run.rows)
+
+
+def rightly(case, convention, edge, surface):
+    """Whether words tell a case's own convention, edge and surface."""
+    scene = case.scene
+    angle = f"half angle {math.degrees(scene.beam.half_angle):.6g} deg"
+    relief = {"bumps": len(scene.surface.bumps) > 0, "ellipsoid": len(set(scene.surface.semi_axes)) > 1}
+    return (
+        convention.startswith(scene.power.convention)
+        and edge.startswith(EDGES[scene.beam.kind])
+        and edge.endswith(angle)
+        and (scene.beam.kind != "cycles" or f"blend {scene.beam.blend:g}" in edge)
+        and (surface == "smooth") == (scene.surface.relief == 0.0 and not relief["ellipsoid"])
+        and all((word in surface) == there for word, there in relief.items() if surface != "smooth")
+    )
+
+
+def of(plan, data, setting):
+    """The cases that a line of a table is about."""
+    keys = [name for name in data.columns if name in setting or "." in name or name in plan.cases[0].swept]
+    for line in data.to_dict("records"):
+        wanted = {key: line[key] for key in keys if not (key == "trajectory" and line[key] == BOTH)}
+        wanted.pop("localizer")
+        labels = [(case, {**case.labels, **case.swept}) for case in plan.cases]
+        found = [case for case, own in labels if all(own[key] == value for key, value in wanted.items())]
+        assert found, wanted
+        yield line, found
+
+
+def test_every_number_of_every_table_states_its_own_convention_edge_and_surface(written):
+    plan, run, boxes = written
+    tables = make_tables(run, boxes)
+    seen = set()
+    for table in tables:
+        if table.name == "table_1":
+            continue
+        for line, cases in of(plan, table.frame, SETTING):
+            for case in cases:
+                seen.add(case.key)
+                assert rightly(case, line["power_convention"], line["edge"], line["surface_shape"]), (table.name, line)
+    assert seen == {case.key for case in plan.cases}
+
+
+def test_every_block_names_what_each_of_its_cases_assumes(written):
+    plan, run, boxes = written
+    tables = [table for table in make_tables(run, boxes) if table.name != "table_1"]
+    for table in tables:
+        assert all("power convention: " in "".join(block.notes) for block in table.blocks)
+        assert "not stated" not in table.text()
+    said = [note for table in tables for block in table.blocks for note in block.notes]
+    for scene in (case.scene for case in plan.cases):
+        words = (scene.power.words, scene.beam.words, scene.surface.words, scene.sensor.words)
+        assert any(all(word in note for word in words) for note in said), words
+
+
+def test_every_figure_states_its_own_convention_edge_and_surface(written):
+    plan, run, boxes = written
+    drawings, _ = plan_figures(run, boxes)
+    assert drawings
+    cases = {case.key: case for case in plan.cases}
+    for drawing in drawings:
+        said = dict(re.findall(r"(edge|power convention|surface shape): (.*?)(?:;|$)", drawing.caption))
+        for key in drawing.cut.rows["case"].unique():
+            words = said["power convention"], said["edge"], said["surface shape"]
+            assert rightly(cases[key], *words), drawing.caption
+        assert "(convention not stated)" not in drawing.caption
+
+
+def test_rows_have_the_declared_columns_in_their_order_and_name_their_frame(written):
+    plan, run, _ = written
+    stored = pd.read_parquet(run.folder / "errors.parquet")
+    declared = [column.name for column in COLUMNS if column.name in stored.columns]
+    assert list(stored.columns) == [*declared, *plan.cases[0].swept]
+    assert {column.name for column in COLUMNS if not column.optional} <= set(stored.columns)
+    frames = {case.key: case.frame for case in plan.cases}
+    assert (stored["case"].map(frames) == stored["frame"]).all()
