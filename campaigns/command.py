@@ -36,8 +36,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
         return code
     except InputError as error:
         return _complain(error, Ending.BAD_INPUT)
-    except KeyboardInterrupt:
-        return _complain("interrupted", Ending.INTERRUPTED)
+    except KeyboardInterrupt as interruption:
+        return _complain(str(interruption) or "interrupted", Ending.INTERRUPTED)
     except BrokenPipeError:
         # the reader of our output went away, `campaign plan | head`
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
@@ -98,7 +98,8 @@ def _parser() -> argparse.ArgumentParser:
         command.add_argument(
             "--workers", metavar="N", type=_workers, default=_cores(), help="processes (default: cores)"
         )
-    add("list", _list, "list the shipped campaigns")
+    listed = add("list", _list, "list the shipped campaigns")
+    listed.add_argument("--localizers", action="store_true", help="list the localizers in their place")
     add("show", _show, "print a campaign's file").add_argument("campaign")
     report = add("report", _report, "make the tables, figures and report of a run folder again")
     report.add_argument("folder", type=Path, metavar="RUN")
@@ -147,36 +148,24 @@ def _validate(options: argparse.Namespace) -> Ending:
 
 def _plan(options: argparse.Namespace) -> Ending:
     from conespot.campaigns.plan import make_plan
-    from conespot.campaigns.plan_words import summary
+    from conespot.campaigns.plan_words import describe
 
-    _say("\n".join(summary(make_plan(_document(options)), options.workers)))
+    _say("\n".join(describe(make_plan(_document(options)), options.workers)))
     return Ending.DONE
 
 
 def _run(options: argparse.Namespace) -> Ending:
-    from conespot.campaigns.plan import make_plan
-    from conespot.campaigns.store import open_store
-
     if options.dry_run:
         return _plan(options)
     document = _document(options)
-    plan = make_plan(document)
-    folder = Path(options.out or Path("runs") / plan.campaign.name)
     # a cluster ends a job with SIGTERM: that is an interruption too
     signal.signal(signal.SIGTERM, signal.default_int_handler)
-    with open_store(folder, plan, document) as store:
-        code = Ending.DONE
-        if plan.cases:
-            from conespot.campaigns.session import measure
+    from conespot.campaigns.pool import LocalPool
+    from conespot.campaigns.session import carry_out
 
-            code = measure(plan, store, options.workers)
-        if plan.campaign.theory:
-            from conespot.campaigns.session import write_theory
-
-            write_theory(folder)
-    if code != Ending.INTERRUPTED:
-        _write_results(folder)
-    return code
+    session = carry_out(document, Path(options.out) if options.out else None, LocalPool(options.workers))
+    _say_results(session.folder)
+    return _complain(session.sentence, Ending.FAILED) if session.lost else Ending.DONE
 
 
 def _theory(options: argparse.Namespace) -> Ending:
@@ -201,7 +190,10 @@ def _report(options: argparse.Namespace) -> Ending:
         if plan.campaign.made_with.get("identity") == plan.identity:
             with open_store(folder, plan, document) as store:
                 store.write_rows()
-    _write_results(folder)
+    from conespot.results import write_results
+
+    write_results(folder)
+    _say_results(folder)
     return Ending.DONE
 
 
@@ -213,15 +205,20 @@ def _compare(options: argparse.Namespace) -> Ending:
     return Ending.DONE
 
 
-def _write_results(folder: Path) -> None:
-    from conespot.results import tables_text, write_results
+def _say_results(folder: Path) -> None:
+    from conespot.results import tables_text
 
-    write_results(folder)
     _say(tables_text(folder))
     _say(f"{folder}: errors.csv, errors.parquet, boxes.csv, tables/, figures/; read report.html first")
 
 
 def _list(options: argparse.Namespace) -> Ending:
+    if options.localizers:
+        from conespot.localize.locate import in_words
+
+        for line in in_words():
+            _say(line)
+        return Ending.DONE
     from conespot.scene.document import read_document, shipped
 
     for name, path in shipped("campaigns", "").items():

@@ -9,6 +9,7 @@ from typing import Any
 from conespot.campaigns.schema import Campaign, Combination
 from conespot.results.columns import names as declared
 from conespot.scene.identity import digest
+from conespot.scene.sensor import sensor_name
 from conespot.scene.spotlights import rig_name
 from conespot.scene.surface import surface_name
 
@@ -22,7 +23,7 @@ _STANDING: dict[str, tuple[str, Callable[[Campaign], Label]]] = {
     "power_w": ("scene.power.value", lambda c: c.scene.power.value),
     "illumination": ("scene.illumination", lambda c: c.scene.illumination.name),
     "surface": ("scene.surface", lambda c: surface_name(c.scene.surface)),
-    "sensor": ("scene.sensor", lambda c: c.scene.sensor.kind),
+    "sensor": ("scene.sensor", lambda c: sensor_name(c.scene.sensor)),
     "resolution_px": ("scene.camera.resolution", lambda c: c.scene.camera.resolution),
 }
 _TOLD = {key for key, _ in _STANDING.values()} | {"localizers"}

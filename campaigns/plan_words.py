@@ -19,7 +19,7 @@ SECONDS_PER_PIXEL = 3e-9
 _MOST_CASES = 60
 
 
-def summary(plan: Plan, workers: int) -> Iterator[str]:
+def describe(plan: Plan, workers: int) -> Iterator[str]:
     """Lines that say what a run of the plan does with that many workers."""
     campaign = plan.campaign
     yield f"{campaign.name}: {campaign.description}".rstrip(": ")

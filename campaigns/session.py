@@ -1,48 +1,86 @@
-"""A session of work on a run: from what is left of the plan to rows in the store."""
+"""A session of work on a run: from what is left of a plan to a run folder with everything in it."""
 
 from __future__ import annotations
 
 import contextlib
 import sys
 from collections.abc import Mapping
+from dataclasses import dataclass
 from pathlib import Path
 
-from conespot.campaigns.ending import Ending
-from conespot.campaigns.executor import execute
+from conespot.campaigns.ending import RunError
+from conespot.campaigns.executor import Executor
 from conespot.campaigns.plan import Plan, make_plan
+from conespot.campaigns.pool import LocalPool
 from conespot.campaigns.progress import Progress
+from conespot.campaigns.row import Record
 from conespot.campaigns.schema import override, read_campaign
 from conespot.campaigns.store import Store, made_with, open_store
 from conespot.scene import InputError
 from conespot.scene.atomic import write_atomically
+from conespot.scene.document import Document
+
+
+@dataclass(frozen=True)
+class Session:
+    """How a session ended: the run folder, and the poses that were `lost`, which another session tries again."""
+
+    folder: Path
+    lost: tuple[Record, ...] = ()
+
+    @property
+    def sentence(self) -> str:
+        """What to say of the poses that were lost."""
+        return f"{len(self.lost)} poses were lost, the first: {self.lost[0].error}; the same command retries them"
 
 
 def run_campaign(
-    campaign: str | Path, out: Path | None = None, *, workers: int = 1, settings: Mapping[str, str] | None = None
+    campaign: str | Path,
+    out: Path | None = None,
+    *,
+    workers: int = 1,
+    settings: Mapping[str, str] | None = None,
+    executor: Executor | None = None,
 ) -> Path:
-    """Run a shipped campaign or a YAML file, or continue it; the run folder, with its rows but no report yet.
+    """Run a shipped campaign or a YAML file, or continue it, as `campaign run` does; the run folder.
 
-    `out` is the run folder (default runs/NAME), `settings` are keys and YAML values such as {"poses": "10"}.
-    Raises InputError for what a user can mend, RunError if the disk refuses or nothing can run.
+    `out` is the run folder (default runs/NAME), `settings` are keys and YAML values such as {"poses": "10"}. The work
+    is done by `workers` processes of this machine, or by the `executor`; a script must start processes below
+    `if __name__ == "__main__":`. Progress goes to stderr. `load_run` reads what the folder holds.
+
+    Raises InputError for what a user can mend, RunError if the disk refuses, nothing can run or poses were lost (all
+    others are in the folder), and KeyboardInterrupt, after which the same call goes on where it was.
     """
     document = read_campaign(str(campaign))
     for key, value in (settings or {}).items():
         document = override(document, key, value, f"settings[{key!r}]")
+    session = carry_out(document, out, executor or LocalPool(workers))
+    if session.lost:
+        raise RunError(session.sentence)
+    return session.folder
+
+
+def carry_out(document: Document, out: Path | None, executor: Executor) -> Session:
+    """Do what is left of a campaign and write what its folder holds: rows, theory, tables, figures, report.
+
+    Raises as `run_campaign` does, but for poses that were lost.
+    """
+    from conespot.results import write_results
+
     plan = make_plan(document)
     folder = out or Path("runs") / plan.campaign.name
     with open_store(folder, plan, document) as store:
         if plan.cases:
-            measure(plan, store, workers)
+            _measure(plan, store, executor)
         if plan.campaign.theory:
-            write_theory(folder)
-    return folder
+            _write_theory(folder)
+        lost = tuple(record for record in store.records.values() if record.error)
+    write_results(folder)
+    return Session(folder, lost)
 
 
-def measure(plan: Plan, store: Store, workers: int) -> Ending:
-    """Do what is left, then write the rows of all that is finished; the exit code.
-
-    Units that were lost before are tried again. Raises RunError if the disk refuses or nothing can run.
-    """
+def _measure(plan: Plan, store: Store, executor: Executor) -> None:
+    """Do what is left, then write the rows of all that is finished. Units that were lost before are tried again."""
     left = [u for u in plan.units() if u.key not in store.records or store.records[u.key].error]
     groups = {unit.key: plan.groups[unit.group] for unit in left}
     progress = Progress(
@@ -54,9 +92,9 @@ def measure(plan: Plan, store: Store, workers: int) -> Ending:
         frames = store.folder / "frames"
         frames.mkdir(exist_ok=True)
     interrupted = False
-    crew = execute(plan, left, max(1, min(workers, len(left))), frames=frames, note=progress.note)
+    records = executor.execute(plan, left, frames=frames, note=progress.note)
     try:
-        for record in crew:
+        for record in records:
             store.append(record)
             group = groups[record.unit]
             progress.update(group.frames, group.work, sum(bool(f.reason) for f in record.findings))
@@ -68,22 +106,15 @@ def measure(plan: Plan, store: Store, workers: int) -> Ending:
             store.write_rows()
         raise
     finally:
-        crew.close()
+        records.close()
     store.write_rows()
     progress.close()
-    lost = [record for record in store.records.values() if record.error]
     if interrupted:
         done = f"{len(store.records)} of {sum(len(g.positions) for g in plan.groups)} poses are kept"
-        progress.note(f"campaign: interrupted; {done}, and the same command continues the run")
-        return Ending.INTERRUPTED
-    if lost:
-        progress.note(
-            f"campaign: {len(lost)} poses were lost, the first: {lost[0].error}; the same command retries them"
-        )
-    return Ending.FAILED if lost else Ending.DONE
+        raise KeyboardInterrupt(f"interrupted; {done}, and the same command continues the run")
 
 
-def write_theory(folder: Path) -> None:
+def _write_theory(folder: Path) -> None:
     """Table I as theory.csv: largest distance of curve and ellipse in the plane, in 3D, and in 3D over the volume."""
     from conespot.localize.theory.conic import table_1
 

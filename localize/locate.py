@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import difflib
+from collections.abc import Iterator
 
 from numpy.typing import ArrayLike
 
@@ -50,6 +51,24 @@ LOCALIZERS: dict[str, Localizer] = {
 def localizer_names() -> list[str]:
     """The names of all localizers, those of this package first; a plug-in cannot take the name of one of these."""
     return list(dict.fromkeys([*LOCALIZERS, *plugins()]))
+
+
+def in_words() -> Iterator[str]:
+    """A line for each localizer: its name, how it tells light from dark and the two cones apart, and what it is given.
+
+    A plug-in that cannot be loaded has the reason in its line.
+    """
+    names = localizer_names()
+    width = max(map(len, names))
+    for name in names:
+        try:
+            entry = find_localizer(name)
+        except InputError as error:
+            yield f"{name:{width}}  {error}"
+            continue
+        given = "; needs the truth" * entry.needs_truth + "; takes knowledge" * entry.takes_knowledge
+        source = "" if name in LOCALIZERS else f"; {plugins()[name].value}"
+        yield f"{name:{width}}  threshold: {entry.threshold}; ambiguity: {entry.ambiguity}{given}{source}"
 
 
 def find_localizer(name: str) -> Localizer:

@@ -79,7 +79,7 @@ def _wrong(found: object) -> str | None:
         good = isinstance(reason, str) and reason.isprintable() and 0 < len(reason) <= _LONGEST_REASON
         return None if good else f"a reason must be a line of 1 to {_LONGEST_REASON} characters"
     if not isinstance(found, Localization):
-        return f"it answered {type(found).__name__}, neither Localization nor LocalizationFailure"
+        return f"it answered {type(found).__name__}, no Localization or LocalizationFailure"
     for what, value in (("apex_mm", found.apex_mm), ("axis", found.axis)):
         if not _finite(value, [(3,)]):
             return f"{what} must be three finite numbers"

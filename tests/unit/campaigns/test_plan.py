@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from conespot.campaigns.plan import frame_seed, make_plan, tile_seed
-from conespot.campaigns.plan_words import summary
+from conespot.campaigns.plan_words import describe
 from conespot.campaigns.schema import Campaign, override, read_campaign
 from conespot.scene import Eye, InputError, Scene
 
@@ -146,9 +146,9 @@ def test_two_helices_bear_different_names(plan):
     assert [c.labels["trajectory"] for c in cases] == ["{kind: helix, turns: 2}", "{kind: helix, turns: 1}", "box"]
 
 
-def test_the_summary_states_both_power_conventions_and_the_renderings():
+def test_the_description_states_both_power_conventions_and_the_renderings():
     document = override(read_campaign("power_sweep"), "poses", "10", "--poses")
-    text = "\n".join(summary(make_plan(document), workers=2))
+    text = "\n".join(describe(make_plan(document), workers=2))
     assert "1 W isotropic = 3.078 mW flux" in text
     assert "80 tiles and 2 backgrounds are rendered" in text
     assert "280 frames, 560 localizations" in text
@@ -163,7 +163,7 @@ def test_edge_samples_are_rendered_apart_and_are_counted_as_work_where_the_beam_
         assert [g.edge_samples for g in (*plain.groups, *fine.groups)] == [0, 65536]
         assert plain.groups[0].scene_key != fine.groups[0].scene_key
         assert tile_seed(plain, next(plain.units()), 0) != tile_seed(fine, next(fine.units()), 0)
-        stated[kind] = [next(line for line in summary(p, 1) if line.startswith("about")) for p in (plain, fine)]
+        stated[kind] = [next(line for line in describe(p, 1) if line.startswith("about")) for p in (plain, fine)]
     assert stated["cycles"][0] == stated["cycles"][1]
     assert stated["hard"][0] != stated["hard"][1]
 

@@ -1,4 +1,4 @@
-"""campaigns.executor: workers that die, raise or never live lose nothing that is finished. The bench is a fake."""
+"""campaigns.pool: workers that die, raise or never live lose nothing that is finished. The bench is a fake."""
 
 import os
 import signal
@@ -8,8 +8,8 @@ import warnings
 import pytest
 
 from conespot.campaigns.ending import RunError
-from conespot.campaigns.executor import execute
 from conespot.campaigns.plan import make_plan
+from conespot.campaigns.pool import LocalPool
 from conespot.campaigns.row import Finding, Record
 from conespot.campaigns.schema import read_campaign
 
@@ -68,7 +68,8 @@ def plan(tmp_path):
 def do(plan, tmp_path, workers=2, make=lives, script=""):
     (tmp_path / "script").write_text(script)
     notes = []
-    records = {r.unit: r for r in execute(plan, plan.units(), workers, frames=tmp_path, note=notes.append, make=make)}
+    pool = LocalPool(workers, make)
+    records = {r.unit: r for r in pool.execute(plan, plan.units(), frames=tmp_path, note=notes.append)}
     return records, notes
 
 
@@ -146,7 +147,7 @@ def test_a_warning_of_all_workers_is_said_once(plan, tmp_path):
 
 
 def test_closing_stops_the_workers(plan, tmp_path):
-    records = execute(plan, plan.units(), 2, frames=tmp_path, make=lives)
+    records = LocalPool(2, lives).execute(plan, plan.units(), frames=tmp_path, note=print)
     next(records)
     started = {int(p.name.split("-")[1]) for p in tmp_path.glob("did-*")}
     records.close()

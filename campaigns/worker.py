@@ -1,0 +1,171 @@
+"""A worker: a process of one thread that measures unit after unit, until it is worn, dies, or is told to end.
+
+It ignores Ctrl-C, which is for the process that owns the store, and ends by itself when that process is gone.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import multiprocessing
+import os
+import signal
+import traceback
+import warnings
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from multiprocessing import resource_tracker
+from multiprocessing.connection import Connection
+from pathlib import Path
+from typing import Protocol
+
+from conespot.campaigns.ending import held_back
+from conespot.campaigns.plan import Plan, Unit
+from conespot.campaigns.row import Record
+
+_ONE_THREAD = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "VECLIB_MAXIMUM_THREADS")
+
+
+class Measures(Protocol):
+    """What a worker does with a unit; `campaigns.bench.Bench` but in tests."""
+
+    @property
+    def worn(self) -> bool:
+        """True when its process should be replaced before the next unit."""
+
+    def measure(self, unit: Unit) -> Record:
+        """The unit's record."""
+
+
+#: makes what measures, in the worker's own process
+MakeBench = Callable[[Plan, Path | None], Measures]
+
+
+def make_bench(plan: Plan, frames: Path | None) -> Measures:
+    """The bench of a worker, imported where it is used: the parent process never loads Mitsuba."""
+    from conespot.campaigns.bench import Bench
+
+    return Bench(plan, frames)
+
+
+@dataclass(frozen=True)
+class Done:
+    """The unit's record; with `last` the process has ended, to make room for a fresh one."""
+
+    record: Record
+    last: bool = False
+
+
+@dataclass(frozen=True)
+class Note:
+    """A warning that all workers give alike."""
+
+    sentence: str
+
+
+@dataclass(frozen=True)
+class Refused:
+    """No process of this machine can measure anything."""
+
+    reason: str
+
+
+@dataclass(frozen=True)
+class Lost:
+    """The process is gone with its unit."""
+
+    how: str
+
+
+Message = Done | Note | Refused | Lost
+
+
+class Worker:
+    """A process, the unit it is busy with, and the key of the scene it has loaded."""
+
+    def __init__(self, plan: Plan, frames: Path | None, make: MakeBench) -> None:
+        context = multiprocessing.get_context("spawn")
+        self.connection, theirs = context.Pipe()
+        self.unit: Unit | None = None
+        self.scene: str | None = None
+        self._process = context.Process(target=_work, args=(theirs, plan, frames, make), daemon=True)
+        with _born():
+            self._process.start()
+        theirs.close()
+
+    def give(self, unit: Unit, scene: str) -> None:
+        """Send a unit of a scene."""
+        self.unit, self.scene = unit, scene
+        # a dead worker is found when its answer is awaited
+        with contextlib.suppress(OSError):
+            self.connection.send(unit)
+
+    def hear(self) -> Message:
+        """What it says next; waits for it."""
+        try:
+            message: Message = self.connection.recv()
+        except (EOFError, OSError):
+            return Lost(self.end())
+        return message
+
+    def end(self, at_once: bool = False) -> str:
+        """Stop the process; how it ended."""
+        if at_once:
+            self._process.kill()
+        self.connection.close()
+        self._process.join(timeout=0.5)
+        if self._process.exitcode is None:
+            self._process.kill()
+            self._process.join()
+        code = self._process.exitcode or 0
+        if code >= 0:
+            return f"ended with exit code {code}"
+        hint = " (out of memory?)" if code == -signal.SIGKILL else ""
+        return f"was killed by {signal.Signals(-code).name}{hint}"
+
+
+def _work(connection: Connection, plan: Plan, frames: Path | None, make: MakeBench) -> None:
+    """A worker's life: units come in, messages go out."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    with contextlib.suppress(EOFError, OSError):
+        try:
+            with warnings.catch_warnings(record=True) as caught:
+                bench = make(plan, frames)
+        except Exception as error:
+            connection.send(Refused(f"cannot render: {error}"))
+            return
+        for warning in caught:
+            if issubclass(warning.category, RuntimeWarning):
+                connection.send(Note(str(warning.message)))
+        last = False
+        while not last:
+            unit = connection.recv()
+            try:
+                record = bench.measure(unit)
+            except Exception as error:
+                record = Record(unit=unit.key, error=_sentence(error))
+            last = bench.worn
+            connection.send(Done(record, last))
+
+
+def _sentence(error: BaseException) -> str:
+    """The error in a line, with the place in the code it came from."""
+    frame = traceback.extract_tb(error.__traceback__)[-1]
+    text = " ".join(str(error).split())[:800]
+    return f"{type(error).__name__}: {text} ({Path(frame.filename).name}:{frame.lineno})"
+
+
+@contextlib.contextmanager
+def _born() -> Iterator[None]:
+    """Processes started meanwhile use one thread and never hear of Ctrl-C: both must be so before they run anything."""
+    before = {key: os.environ.get(key) for key in _ONE_THREAD}
+    resource_tracker.ensure_running()  # started with the first process, it would let the signal through
+    with held_back(signal.SIGINT):
+        os.environ.update(dict.fromkeys(_ONE_THREAD, "1"))
+        try:
+            yield
+        finally:
+            for key, value in before.items():
+                if value is None:
+                    del os.environ[key]
+                else:
+                    os.environ[key] = value
