@@ -98,7 +98,7 @@ def test_code_that_raises_costs_its_unit_alone(plan, tmp_path):
     records, notes = do(plan, tmp_path, script="2 raises")
     assert len(records) == 12
     assert list(errors(plan, records)) == [2]
-    assert errors(plan, records)[2].startswith("ValueError: no such luck (test_executor.py:")
+    assert errors(plan, records)[2].startswith("ValueError: no such luck (test_pool.py:")
     assert notes == []
 
 
