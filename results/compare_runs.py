@@ -77,7 +77,7 @@ def _text(comparisons: Sequence[Comparison], exposures: dict[str, RetinalExposur
         lines.append("")
     lines += [*assumed.values(), ""]
     lines.append("Retinal exposure at the highest power, worst over the poses:")
-    lines += [f"  {name}: {exposure.sentence}" for name, exposure in exposures.items()]
+    lines += [f"  {name}: {exposure.sentence}" for name, exposure in exposures.items()] or ["  not stated"]
     return "\n".join(lines) + "\n"
 
 

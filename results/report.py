@@ -10,6 +10,7 @@ from typing import Any
 import jinja2
 
 from conespot.results.assumptions import Assumptions, assumptions
+from conespot.results.columns import SETTING, column
 from conespot.results.figures import Drawing
 from conespot.results.light_exposure import light_exposures
 from conespot.results.paper_values import CITATION
@@ -69,10 +70,14 @@ def _facts(run: Run) -> list[tuple[str, str]]:
         ("failed", f"{failed} ({100.0 * failed / len(frame):.3g} %)"),
         ("power", f"{', '.join(powers[:20])}{' ...' if len(powers) > 20 else ''} W"),
     ]
-    for name in ("localizer", "trajectory", "spotlights", "surface", "illumination", "sensor", "resolution_px"):
-        values = [str(value) for value in ordered(frame[name])]
-        title, unit = ("resolution", " px") if name == "resolution_px" else (name, "")
-        facts.append((title, ", ".join(values[:12]) + (" ..." if len(values) > 12 else "") + unit))
+    for name in SETTING:
+        if name != "power_w":
+            c = column(name)
+            values = [str(value) for value in ordered(frame[name])]
+            text = f"{', '.join(values[:12])}{' ...' if len(values) > 12 else ''} {c.unit}".rstrip()
+            facts.append((name.removesuffix(f"_{c.unit}"), text))
+    stated = assumptions(run.cases, frame)
+    facts += [("power convention", stated.power_convention), ("transfer", stated.transfer)]
     exposures = light_exposures(run).items()
     return facts + [(f"retinal exposure, {name}", exposure.sentence) for name, exposure in exposures]
 

@@ -72,8 +72,8 @@ def test_csv_and_parquet_hold_the_same_rows(plan, document, run):
     )
     assert len(rows) == plan.rows == 32
     assert set(rows["status"]) == {"ok", "failed"}
-    assert list(rows.columns)[:12] == [
-        "case", "trajectory", "spotlights", "power_w", "illumination", "surface", "sensor", "resolution_px",
+    assert list(rows.columns)[:13] == [
+        "case", "frame", "trajectory", "spotlights", "power_w", "illumination", "surface", "sensor", "resolution_px",
         "localizer", "pose", "status", "reason",
     ]  # fmt: skip
     assert list(rows.columns)[-1] == "seed"
