@@ -11,27 +11,18 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from conespot.localize.image import Signal
 from conespot.localize.model.occlusion import covered
 from conespot.localize.model.profile import Profile
-from conespot.localize.start.rings import Overview, Plane
+from conespot.localize.start.rings import Overview
+from conespot.localize.start.settings import START
 from conespot.scene.beam import Beam
 from conespot.scene.pose import Pose
 from conespot.scene.scene import Scene
 
 Array = NDArray[np.float64]
-_RAYS = 36
-_BLUR = 0.03  # of the distance from the patch's middle to its outline, the unit of what follows
-_ALONG = np.arange(0.5, 1.43, 0.04)
-_INSIDE, _OUTSIDE = _ALONG < 0.7, _ALONG > 1.15
-_NEEDED = len(_ALONG) - 4  # samples of a ray that must be in the frame
-SHIFTS = 0.03 * np.arange(-8, 9)  #: of the outline that are tried
-_FRACTIONS = np.linspace(0.0, 2.5, 501)  # of the half angle
-_WHITE = 0.97
-_USUAL_CONTRAST = 30.0  # of a patch over its surroundings; its logarithm is what matters
-_WIDEST = 0.25  # blur of the profile
-#: contrasts that are tried, over the one measured: of a clipped patch only the rim is seen, and where other things
-#: are bright what lies inside and outside the outline says little
-_PLAIN, _CLIPPED, _WIDE = (1.0,), (1.0, 4.0, 16.0, 64.0), (0.06, 0.12, 0.25, 0.5, 1.0, 2.0)
+#: where a beam's profile is tabulated, over its half angle: finer than any ray is sampled
+_FRACTIONS = np.linspace(0.0, 2.5, 501)
 
 
 @dataclass(frozen=True)
@@ -41,17 +32,18 @@ class Rays:
     spotlight: int
     middle: Array  #: `[2]` [px]
     ends: Array  #: where the rays meet the outline `[N, 2]` [px]
-    left: Array  #: sums of absolute gradients without the light of the outline moved by `SHIFTS` `[N, S]`
+    left: Array  #: sums of absolute gradients without the light of the outline moved by `START.shifts` `[N, S]`
     total: Array  #: sums of absolute gradients `[N]`
 
     def found(self) -> tuple[Array, Array]:
         """Where each ray sees the outline `[N, 2]` [px], and the share of its gradients that says so `[N]`."""
+        shifts = START.shifts
         row, k = np.arange(len(self.left)), np.argmin(self.left, axis=1)
-        inner = np.clip(k, 1, len(SHIFTS) - 2)
+        inner = np.clip(k, 1, len(shifts) - 2)
         below, here, above = (self.left[row, inner + j] for j in (-1, 0, 1))
         # sums of absolute values have a pointed minimum
         tip = 0.5 * (below - above) / np.maximum(np.maximum(below, above) - here, 1e-9)
-        shift = SHIFTS[inner] + np.clip(tip, -0.5, 0.5) * (SHIFTS[1] - SHIFTS[0])
+        shift = shifts[inner] + np.clip(tip, -0.5, 0.5) * (shifts[1] - shifts[0])
         worth = np.where(k == inner, 1.0 - here / np.maximum(self.total, 1e-6), 0.0)
         return self.middle + (1.0 + shift)[:, None] * (self.ends - self.middle), worth
 
@@ -62,7 +54,7 @@ def support(seen: Sequence[Rays]) -> tuple[float, float, float]:
     The mean share, the share that a quarter of the rays exceed, and the mean sum, which is what a ray adds to the
     log-likelihood.
     """
-    middle = len(SHIFTS) // 2
+    middle = START.most_shift
     total = np.concatenate([rays.total for rays in seen])
     left = np.concatenate([rays.left for rays in seen])
     here = np.abs(np.argmin(left, axis=1) - middle) <= 1
@@ -76,7 +68,7 @@ def rays_across(overview: Overview, scene: Scene, pose: Pose, *, thorough: bool 
 
     `thorough` doubts the contrast between what lies inside and outside the outline.
     """
-    curves = [scene.camera.project(scene.outline(pose, k, _RAYS)) for k in range(len(scene.spotlights))]
+    curves = [scene.camera.project(scene.outline(pose, k, START.rays)) for k in range(len(scene.spotlights))]
     found = [
         _across(overview, scene, pose, curves, k, thorough)
         for k, curve in enumerate(curves)
@@ -89,38 +81,44 @@ def _across(
     overview: Overview, scene: Scene, pose: Pose, curves: Sequence[Array], spotlight: int, thorough: bool
 ) -> Rays | None:
     curve = curves[spotlight]
+    along = START.along
+    needed = len(along) - START.samples_missed
     last = overview.light.shape[0] - 1.0
     bins = curve / overview.step - 0.5
     middle = bins.mean(axis=0)
-    at = middle + _ALONG[None, :, None] * (bins - middle)[:, None, :]
+    at = middle + along[None, :, None] * (bins - middle)[:, None, :]
     valid = np.all((at >= 0.0) & (at <= last), axis=2)
     if scene.instrument.shaft is not None:
         pixels = ((at + 0.5) * overview.step).reshape(-1, 2)
         clear = valid & ~covered(pixels, pose, scene, side=overview.step).reshape(valid.shape)
         # a pose far off does not tell where the shaft is
-        valid = clear if np.count_nonzero(clear[:, :_NEEDED].all(axis=1)) >= _RAYS // 4 else valid
-    use = valid[:, :_NEEDED].all(axis=1)
-    if np.count_nonzero(use) < _RAYS // 4:
+        valid = clear if np.count_nonzero(clear[:, :needed].all(axis=1)) >= START.fewest_rays else valid
+    use = valid[:, :needed].all(axis=1)
+    if np.count_nonzero(use) < START.fewest_rays:
         return None
     at, valid = at[use], valid[use]
     size = float(np.mean(np.linalg.norm(bins - middle, axis=1)))
-    blur = max(0.5, _BLUR * size)
+    blur = max(START.least_blur, START.ray_blur * size)
     light = _sampled(overview.light, at, blur)
     ground = None if overview.reference is None else _sampled(overview.reference, at, blur)
     log = overview.logarithm(light, ground).astype(float)
-    inside, outside = (float(np.median(log[:, part])) for part in (_INSIDE, _OUTSIDE))
-    profile, kernel = _profile(scene.beam), _kernel(round(min(_WIDEST, math.hypot(blur, 0.4) / size), 2))
-    contrast = math.expm1(max(0.05, inside - outside)) / max(0.02, float(np.interp(0.6, _FRACTIONS, profile)))
-    clipped = float(np.mean(light[:, _INSIDE] > _WHITE)) > 0.3
+    core = along < START.inside
+    inside, outside = (float(np.median(log[:, part])) for part in (core, along > START.outside))
+    profile = _profile(scene.beam)
+    kernel = _kernel(round(min(START.widest_blur, math.hypot(blur, START.sampling_blur) / size), 2))
+    there = float(np.interp(0.5 * (along[0] + START.inside), _FRACTIONS, profile))
+    contrast = math.expm1(max(START.least_contrast, inside - outside)) / max(START.darkest_profile, there)
+    clipped = float(np.mean(light[:, core] > START.white)) > START.clipped_share
+    doubts = START.clipped_contrasts if clipped else START.doubted_contrasts if thorough else (1.0,)
     ceiling = (1.0 + overview.floor) / math.exp(outside) if clipped else math.inf
     kept = valid[:, 1:].astype(float)
     steps = np.diff(log, axis=1) * kept
     blurred = np.convolve(profile, kernel, "same")
     others = [_within(at, other / overview.step - 0.5, blurred) for k, other in enumerate(curves) if k != spotlight]
     tried = []
-    for factor in _CLIPPED if clipped else _WIDE if thorough else _PLAIN:
+    for factor in doubts:
         bright = np.convolve(np.minimum(1.0 + factor * contrast * profile, ceiling), kernel, "same")
-        model = np.interp(_ALONG / (1.0 + SHIFTS[:, None]), _FRACTIONS, bright)[None]
+        model = np.interp(along / (1.0 + START.shifts[:, None]), _FRACTIONS, bright)[None]
         if others:
             model = np.minimum(model + factor * contrast * np.sum(others, axis=0)[:, None], ceiling)
         tried.append(np.abs(steps[:, None] - np.diff(np.log(model), axis=2) * kept[:, None]).sum(axis=2))
@@ -141,7 +139,7 @@ def _within(at: Array, curve: Array, profile: Array) -> Array:
     return np.interp(np.hypot(off[..., 0], off[..., 1]) / radius, _FRACTIONS, profile)
 
 
-def _sampled(plane: Plane, at: Array, blur: float) -> Plane:
+def _sampled(plane: Signal, at: Array, blur: float) -> Signal:
     """The blurred plane at points `[..., 2]` in its pixels' indices."""
     side = plane.shape[0]
     low = np.clip(np.floor(at.min(axis=(0, 1))).astype(int) - 3, 0, side - 2)
@@ -162,7 +160,7 @@ def _profile(beam: Beam) -> Array:
 @lru_cache(maxsize=8)
 def rim(beam: Beam) -> float:
     """Where a patch's rim seems to be, over the half angle: the mean place of the log light's gradients."""
-    drop = -np.diff(np.log1p(_USUAL_CONTRAST * _profile(beam)))
+    drop = -np.diff(np.log1p(START.rim_contrast * _profile(beam)))
     return float(np.sum(drop * 0.5 * (_FRACTIONS[1:] + _FRACTIONS[:-1])) / np.sum(drop))
 
 

@@ -11,14 +11,12 @@ from numpy.typing import NDArray
 from conespot.localize.model.forward import look
 from conespot.localize.start.rays import rim
 from conespot.localize.start.rings import Ring
+from conespot.localize.start.settings import START
 from conespot.scene.pose import Pose
 from conespot.scene.scene import Scene
 from conespot.scene.spotlights import spotlight_axes
 
 Array = NDArray[np.float64]
-_ROLLS = 36
-_TURNED = 0.6  # between rolls that count as two [rad]
-_MATCHED = 0.8  # of a patch's radius: how far its ring may be from where the rig puts it
 
 
 def poses_on(rings: Sequence[Ring], scene: Scene) -> list[Pose]:
@@ -30,14 +28,14 @@ def poses_on(rings: Sequence[Ring], scene: Scene) -> list[Pose]:
     middles, distances = _cones(rings, scene)
     rcm = np.asarray(scene.instrument.rcm)
     number = len(scene.spotlights)
-    rolls = np.arange(_ROLLS) * (2.0 * math.pi / _ROLLS) if number > 1 else np.zeros(1)
+    rolls = np.arange(START.rolls) * (2.0 * math.pi / START.rolls) if number > 1 else np.zeros(1)
     down = Pose(np.zeros(3), np.array([0.0, 0.0, -1.0]))
     rig = np.stack([spotlight_axes(Pose(down.apex, down.axis, float(roll)), scene.spotlights) for roll in rolls])
     # every ring, as the patch of every spotlight, at every roll
     ring, spot, roll = (i.ravel() for i in np.indices((len(rings), number, len(rolls))))
     axis = (middles - rcm) / np.linalg.norm(middles - rcm, axis=1, keepdims=True)
     axis, reach = axis[ring], distances[ring][:, None]
-    for _ in range(3):
+    for _ in range(START.rig_steps):
         apex = middles[ring] - reach * axis
         frame = _frames(apex - rcm)
         axis = np.einsum("hij,hj->hi", frame, rig[roll, spot])
@@ -47,16 +45,16 @@ def poses_on(rings: Sequence[Ring], scene: Scene) -> list[Pose]:
     wall = apex[:, None] + scene.eye.intersect(apex[:, None], axes)[..., None] * axes
     centres, radii = np.array([r.centre for r in rings]), np.array([r.radius for r in rings])
     own = radii[ring][:, None, None]
-    size = 0.5 * np.abs(np.log(radii / own))
+    size = START.size_weight * np.abs(np.log(radii / own))
     off = np.linalg.norm(scene.camera.project(wall)[:, :, None] - centres, axis=3) / own + size
-    far = np.minimum(np.nan_to_num(off.min(axis=2), nan=_MATCHED), _MATCHED)
-    score = np.where(np.sum(far < _MATCHED, axis=1) > 1, far.sum(axis=1), math.inf)
+    far = np.minimum(np.nan_to_num(off.min(axis=2), nan=START.matched), START.matched)
+    score = np.where(np.sum(far < START.matched, axis=1) > 1, far.sum(axis=1), math.inf)
     kept: list[Pose] = []
     for h in np.argsort(score):
         if not math.isfinite(score[h]) or len(kept) == number + 1:
             break
         turn = float(rolls[roll[h]])
-        new = all(abs(math.remainder(turn - other.roll, 2.0 * math.pi)) > _TURNED for other in kept)
+        new = all(abs(math.remainder(turn - other.roll, 2.0 * math.pi)) > START.turned for other in kept)
         if new and _in_eye(apex[h], scene):
             kept.append(Pose(apex[h], Pose.through(apex[h], rcm).axis, turn))
     return kept
@@ -75,7 +73,7 @@ def _cones(rings: Sequence[Ring], scene: Scene) -> tuple[Array, Array]:
     off = edges - middles[:, None]
     off = off - np.einsum("nij,nj->ni", off, line)[..., None] * line[:, None]
     away = np.linalg.norm(off, axis=2).mean(axis=1) / math.tan(scene.beam.half_angle * rim(scene.beam))
-    return middles, np.minimum(away, 0.95 * np.linalg.norm(middles - rcm, axis=1))
+    return middles, np.minimum(away, START.farthest * np.linalg.norm(middles - rcm, axis=1))
 
 
 def _frames(directions: Array) -> Array:

@@ -17,41 +17,36 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import fft
 
-from conespot.localize.image import Frame, Reference
+from conespot.localize.image import Frame, Reference, Signal
 from conespot.localize.model.residual import spread
+from conespot.localize.start.settings import START
 from conespot.scene.scene import Scene
 
 Array = NDArray[np.float64]
-Plane = NDArray[np.float32]
-_OVERVIEW_PX = 500  # about this many pixels a side are looked at
-_SHRINK, _FINE = 4, 2  # overview pixels a side of a bin of the vote
-_FINE_BINS = 8.0  # largest radius that needs fine bins
-_BLUR_BINS = 0.7
-_FULL_VOTE = 0.12  # gradient of the log light a bin that has half a vote
-_RATIO = 1.2  # of neighbouring radii
-_HIDDEN_BINS = 3
+#: keeps the logarithm of a frame that is black all over finite [white]
+_DARKEST = 1e-5
 
 
 @dataclass(frozen=True)
 class Overview:
     """Every `step`-th pixel of a frame, in one channel, as light; and the same of a reference frame."""
 
-    light: Plane  #: `[h, w]` [white]
-    reference: Plane | None  #: `[h, w]` [white]
+    light: Signal  #: `[h, w]` [white]
+    reference: Signal | None  #: `[h, w]` [white]
     step: int
     floor: float  #: added before the logarithm, so that noise in the dark and dark vessels count little [white]
 
     @classmethod
     def of(cls, frame: Frame, reference: Reference | None) -> Overview:
         """The overview of a frame."""
-        step = max(1, frame.side // _OVERVIEW_PX)
+        step = max(1, frame.side // START.overview_px)
         light = _one_channel(frame, step)
         noise = spread(np.diff(light[::3, ::2], axis=1)) / math.sqrt(2.0)
-        floor = max(0.5 * float(np.median(light[::3, ::3])), 4.0 * noise, 1e-5)
+        floor = max(START.dark_share * float(np.median(light[::3, ::3])), START.noise_sigmas * noise, _DARKEST)
         dark = None if reference is None else _one_channel(Frame(reference.pixels, frame.sensor), step)
         return cls(light, dark, step, floor)
 
-    def logarithm(self, light: Plane, reference: Plane | None) -> Plane:
+    def logarithm(self, light: Signal, reference: Signal | None) -> Signal:
         """The logarithm of light, over that of the reference if there is one; any shape."""
         result = np.log(np.maximum(light, 0.0) + np.float32(self.floor))
         if reference is not None:
@@ -80,24 +75,24 @@ def find_rings(
 
     `small` rings need finer bins, which take longer.
     """
-    shrink = _FINE if small else _SHRINK
-    n = overview.light.shape[0] // shrink
+    side = START.fine_bin_side if small else START.bin_side
+    n = overview.light.shape[0] // side
     planes = [
         None if plane is None else np.asarray(cv2.resize(plane, (n, n), interpolation=cv2.INTER_AREA), np.float32)
         for plane in (overview.light, overview.reference)
     ]
     assert planes[0] is not None
-    log = np.asarray(cv2.GaussianBlur(overview.logarithm(planes[0], planes[1]), (0, 0), _BLUR_BINS), np.float32)
+    log = np.asarray(cv2.GaussianBlur(overview.logarithm(planes[0], planes[1]), (0, 0), START.vote_blur), np.float32)
     gx, gy = (cv2.Scharr(log, cv2.CV_32F, dx, 1 - dx, scale=1.0 / 32.0) for dx in (1, 0))
-    vote = 1.0 / (np.sqrt(gx * gx + gy * gy) + np.float32(_FULL_VOTE))
-    scale = overview.step * shrink
+    vote = 1.0 / (np.sqrt(gx * gx + gy * gy) + np.float32(START.half_vote))
+    scale = overview.step * side
     for curve in hidden:
         points = np.round(curve / scale - 0.5).astype(np.int32)
-        vote = np.asarray(cv2.polylines(vote, [points], True, 0.0, _HIDDEN_BINS), np.float32)
+        vote = np.asarray(cv2.polylines(vote, [points], True, 0.0, START.hidden_width), np.float32)
     reach = math.tan(scene.beam.half_angle) / (scene.camera.pixel_pitch * scale)  # bins of radius a mm of distance
-    low, high = max(1.2, 0.7 * reach), max(2.4, reach * scene.eye.radius)
-    high = max(2.0 * low, _FINE_BINS) if small else high
-    radii = tuple(np.geomspace(low, high, max(3, round(math.log(high / low, _RATIO)) + 1)).tolist())
+    low, high = max(START.smallest, START.nearest * reach), max(2.0 * START.smallest, reach * scene.eye.radius)
+    high = max(2.0 * low, START.fine_reach) if small else high
+    radii = tuple(np.geomspace(low, high, max(3, round(math.log(high / low, START.radius_ratio)) + 1)).tolist())
     size = int(fft.next_fast_len(n + math.ceil(high) + 2, real=True))
     field = fft.rfft2(np.stack([gx * vote, gy * vote]), s=(size, size))
     kernels = _kernels(size, radii)
@@ -112,8 +107,8 @@ def find_rings(
         found.append(Ring(centre, scale * radii[k] * (radii[1] / radii[0]) ** grow, best))
         away = (x - column) ** 2 + (y - row) ** 2
         for j, radius in enumerate(radii):
-            if 0.5 < radius / radii[k] < 2.0:
-                votes[j][away < (0.5 * max(radius, radii[k])) ** 2] = -1.0
+            if 1.0 / START.one_ring_size < radius / radii[k] < START.one_ring_size:
+                votes[j][away < (START.one_ring_place * max(radius, radii[k])) ** 2] = -1.0
     return found
 
 
@@ -135,14 +130,14 @@ def _kernels(size: int, radii: tuple[float, ...]) -> NDArray[np.complex64]:
     distance = np.maximum(np.hypot(y[:, None], y), 1e-6)
     result = []
     for radius in radii:
-        weight = np.exp(-0.5 * ((distance - radius) / max(0.6, 0.08 * radius)) ** 2)
+        weight = np.exp(-0.5 * ((distance - radius) / max(START.ring_width, START.ring_width_share * radius)) ** 2)
         weight[0, 0] = 0.0
         weight /= weight.sum() * distance
         result.append([np.conj(fft.rfft2(-y[None, :] * weight)), np.conj(fft.rfft2(-y[:, None] * weight))])
     return np.array(result, np.complex64)
 
 
-def _one_channel(frame: Frame, step: int) -> Plane:
+def _one_channel(frame: Frame, step: int) -> Signal:
     """Light in a frame's brightest channel, every `step`-th pixel."""
     every = slice(step // 2, None, step)
     return np.ascontiguousarray(frame.light(every, every)[0].max(axis=2), np.float32)

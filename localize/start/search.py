@@ -24,6 +24,7 @@ from conespot.localize.outcome import Localization, LocalizationFailure, Outcome
 from conespot.localize.start.rays import rays_across, support
 from conespot.localize.start.rig import poses_on
 from conespot.localize.start.rings import Overview, Ring, find_rings
+from conespot.localize.start.settings import START
 from conespot.scene.pose import Pose
 from conespot.scene.scene import Scene
 
@@ -31,26 +32,6 @@ Array = NDArray[np.float64]
 NOTHING = "no spotlight stands out from its surroundings"
 ELSEWHERE = "the light is not where the fit puts the patch"
 TWO_PLACES = "two places in the frame look like the patch"
-_NEAR = 0.1  # of a patch's radius within which a fit stays near its start; starts are good to a third of it
-_SAME, _SOLID = 0.3, 0.5  # of it, and share explained, with which a ring is not followed once more
-_RINGS = 6
-_TURNS = 4  # steps from a ring's pose to that of the outline the rays see
-_FEWEST_RAYS = 8
-_DARK = 0.05  # share explained of one spotlight's outline below which it is not there
-_STILL_MM = 0.01
-_LEAST_WORTH = 0.2  # share of a ray's gradients that says where the outline is
-#: share of the gradients that a patch explains where nothing else is bright; a disc may explain nearly as much
-CONVINCING = 0.6
-#: what crosses a rim hides it on some rays only: a quarter of them must see more of the beam's edge than of all else
-_CLEAR = 0.52
-#: log light that all rays together must see in the mean, and the share of it: the retina's own mottle stays below
-_FAINTEST, _LEAST = 0.3, 0.25
-#: share of the best pose's evidence with which another one may be right: after a convincing one, and otherwise
-#: where the two touch, so that each hides part of the other's outline, or lie apart
-_AS_GOOD, _TOUCHING, _APART = 0.8, 0.25, 0.5
-_FITTED = 3
-_RIVAL = 0.85  # share of the best ring's votes with which another may be the patch
-_APART_MM = 0.1  # between poses that count as two
 
 
 @dataclass(frozen=True)
@@ -65,7 +46,7 @@ class Start:
     @property
     def stands_out(self) -> bool:
         """Whether it may be a spotlight's light at all."""
-        return self.clearest > _CLEAR and self.explained > _LEAST and self.evidence > _FAINTEST
+        return self.clearest > START.clear and self.explained > START.least_share and self.evidence > START.faintest
 
     def near(self, pose: Pose, scene: Scene, share: float) -> bool:
         """Whether the outlines of `pose` are within a `share` of their radius of where the start found them."""
@@ -98,11 +79,12 @@ def find_start(frame: Frame, scene: Scene, reference: Reference | None = None) -
 def find_starts(frame: Frame, scene: Scene, reference: Reference | None = None) -> Iterator[Start]:
     """Distinct first poses from a frame, the one that explains it best first."""
     overview = Overview.of(frame, reference)
-    most = _RINGS if len(scene.spotlights) == 1 else _RINGS + 2 * len(scene.spotlights)
+    several = len(scene.spotlights) > 1
+    most = START.most_rings + several * START.rings_per_spotlight * len(scene.spotlights)
     rings = find_rings(overview, scene, most)
-    first = [ring for ring in rings if _rivals(ring, rings[0])] if len(scene.spotlights) == 1 else rings
+    first = rings if several else [ring for ring in rings if _rivals(ring, rings[0])]
     found = _settled(overview, scene, first, [])
-    if not found or found[0].explained <= CONVINCING:
+    if not found or found[0].explained <= START.convincing:
         # a patch that touches something brighter: what was found is taken out of the vote
         hidden = [rings[0].curve(), *(_outlines(start.pose, scene) for start in found[:1])]
         more = [ring for curve in hidden for ring in find_rings(overview, scene, most, [curve])]
@@ -110,8 +92,9 @@ def find_starts(frame: Frame, scene: Scene, reference: Reference | None = None) 
         found = _settled(overview, scene, [*rings, *more], found, thorough=True)
     if found:
         found = _merged([*found, *_turned(overview, scene, found[0])])
-    for start in found[:_FITTED]:
-        share = _AS_GOOD if found[0].explained > CONVINCING else _TOUCHING if start.touches(found[0], scene) else _APART
+    for start in found[: START.most_starts]:
+        unsure = START.touching if start.touches(found[0], scene) else START.apart
+        share = START.as_good if found[0].explained > START.convincing else unsure
         if start.evidence >= share * found[0].evidence and start.stands_out:
             yield start
 
@@ -124,13 +107,13 @@ def believed(starts: Iterable[Start], scene: Scene, localized: Callable[[Start],
         outcome = localized(start)
         if isinstance(outcome, Localization):
             pose = Pose(outcome.apex_mm, outcome.axis, outcome.roll or 0.0)
-            if start.near(pose, scene, _NEAR):
-                if found is not None and float(np.linalg.norm(found.apex_mm - outcome.apex_mm)) > _APART_MM:
+            if start.near(pose, scene, START.near):
+                if found is not None and float(np.linalg.norm(found.apex_mm - outcome.apex_mm)) > START.apart_mm:
                     return LocalizationFailure(TWO_PLACES)
                 found = outcome if found is None else found
                 continue
             outcome = LocalizationFailure(ELSEWHERE)
-        if found is None and refusal is None and start.explained > CONVINCING:
+        if found is None and refusal is None and start.explained > START.convincing:
             return outcome
         refusal = outcome if refusal is None else refusal
     if found is not None:
@@ -139,8 +122,10 @@ def believed(starts: Iterable[Start], scene: Scene, localized: Callable[[Start],
 
 
 def _rivals(ring: Ring, best: Ring) -> bool:
+    """Whether a ring may be the patch as well as the best one, and is not the same once more."""
     apart = float(np.linalg.norm(ring.centre - best.centre))
-    return ring is best or (ring.votes > _RIVAL * best.votes and apart > 0.7 * max(ring.radius, best.radius))
+    elsewhere = apart > START.rival_distance * max(ring.radius, best.radius)
+    return ring is best or (ring.votes > START.rival_votes * best.votes and elsewhere)
 
 
 def _outlines(pose: Pose, scene: Scene) -> Array:
@@ -154,7 +139,7 @@ def _settled(
     found = list(before)
     for pose in poses_on(rings, scene):
         # another ring on the outline of a start that is all but convincing leads there again
-        if any(start.explained > _SOLID and start.near(pose, scene, _SAME) for start in found):
+        if any(start.explained > START.solid and start.near(pose, scene, START.same) for start in found):
             continue
         start = _settle(overview, scene, pose, thorough=thorough)
         if start is not None:
@@ -167,7 +152,7 @@ def _turned(overview: Overview, scene: Scene, best: Start) -> Iterator[Start]:
 
     Turned by half as much, all patches but one may still fall on one another.
     """
-    parts = len(scene.spotlights) * (1 if best.explained > CONVINCING else 2)
+    parts = len(scene.spotlights) * (1 if best.explained > START.convincing else 2)
     for k in range(1, parts if len(scene.spotlights) > 1 else 1):
         pose = Pose(best.pose.apex, best.pose.axis, best.pose.roll + 2.0 * math.pi * k / parts)
         start = _settle(overview, scene, pose, thorough=False)
@@ -186,30 +171,30 @@ def _merged(found: Sequence[Start]) -> list[Start]:
 
 def _differ(a: Pose, b: Pose) -> bool:
     turned = abs(math.remainder(a.roll - b.roll, 2.0 * math.pi))
-    return float(np.linalg.norm(a.apex - b.apex)) > _APART_MM or turned > 0.2
+    return float(np.linalg.norm(a.apex - b.apex)) > START.apart_mm or turned > START.apart_rad
 
 
 def _settle(overview: Overview, scene: Scene, pose: Pose, *, thorough: bool) -> Start | None:
     """The pose near `pose` whose outlines the rays see; None where there is none."""
     estimate = Estimate(pose, scene)
-    for turn in range(_TURNS + 1):
+    for turn in range(START.turns + 1):
         seen = rays_across(overview, scene, estimate.pose, thorough=thorough)
         if not seen:
             return None
         points, worth = (np.concatenate(parts) for parts in zip(*(rays.found() for rays in seen), strict=True))
         # a spotlight of which the frame shows nothing where it should be denies the whole pose
-        lit = min(support([rays])[0] for rays in seen) > _DARK
+        lit = min(support([rays])[0] for rays in seen) > START.dark
         here = Start(estimate.pose, *support(seen)) if lit else None
-        if turn == _TURNS:
+        if turn == START.turns:
             return here
         spots = np.concatenate([np.full(len(r.total), r.spotlight, np.intp) for r in seen])
         sizes = np.concatenate([np.linalg.norm(r.ends - r.middle, axis=1) for r in seen])
-        keep = worth > _LEAST_WORTH
+        keep = worth > START.ray_worth
         moved_to = _towards(estimate, points[keep], spots[keep], worth[keep], sizes[keep])
         if moved_to is None:
             return None
         shift = float(np.linalg.norm(moved_to.pose.apex - estimate.pose.apex))
-        if shift < _STILL_MM and abs(moved_to.pose.roll - estimate.pose.roll) < 1e-3:
+        if shift < START.still_mm and abs(moved_to.pose.roll - estimate.pose.roll) < START.still_rad:
             return here
         estimate = moved_to
     return None
@@ -217,7 +202,7 @@ def _settle(overview: Overview, scene: Scene, pose: Pose, *, thorough: bool) -> 
 
 def _towards(estimate: Estimate, pixels: Array, spots: NDArray[np.intp], worth: Array, sizes: Array) -> Estimate | None:
     """One step of Gauss and Newton towards outlines through `pixels` `[N, 2]` [px], with the axis on the RCM."""
-    if len(pixels) < _FEWEST_RAYS:
+    if len(pixels) < START.fewest_points:
         return None
     scene, pose = estimate.scene, estimate.pose
     roll = len(scene.spotlights) > 1
@@ -228,13 +213,13 @@ def _towards(estimate: Estimate, pixels: Array, spots: NDArray[np.intp], worth: 
     tied = jacobian[:, :3] + (np.outer(jacobian[:, 3], u) + np.outer(jacobian[:, 4], v)) / length
     if roll:
         tied = np.column_stack([tied, jacobian[:, 5]])
-    scale = np.maximum(0.01 * sizes, spread(r))
+    scale = np.maximum(START.outline_error * sizes, spread(r))
     weighted = tied * (worth / (4.0 + np.square(r / scale)) / scale**2)[:, None]
     try:
         step = -np.linalg.solve(weighted.T @ tied, weighted.T @ r)
     except np.linalg.LinAlgError:
         return None
-    reach = 0.4 * float(scene.eye.intersect(pose.apex, pose.axis))
+    reach = START.longest_step * float(scene.eye.intersect(pose.apex, pose.axis))
     step *= min(1.0, reach / max(1e-9, float(np.linalg.norm(step[:3]))))
     tip = pose.apex + step[:3]
     if not np.all(np.isfinite(step)) or scene.depth(tip) <= 0.0:
