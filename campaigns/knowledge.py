@@ -15,7 +15,6 @@ from pydantic import BeforeValidator, Field, PlainSerializer, model_validator
 
 from conespot.localize.model.prior import RCM_SIGMA_MM, Knowns
 from conespot.scene import Scene
-from conespot.scene.beam import stretched
 from conespot.scene.model import Model
 from conespot.scene.quantity import Angle, Length, format_quantity
 from conespot.scene.surface import AnySurface
@@ -88,7 +87,7 @@ class Knowledge(Model):
             told = np.asarray(scene.instrument.rcm) + self.rcm_error * rcm
             update["instrument"] = scene.instrument.model_copy(update={"rcm": tuple(map(float, told))})
         if self.half_angle_error:
-            update["beam"] = stretched(scene.beam, scene.beam.half_angle + self.half_angle_error * float(others[0]))
+            update["beam"] = scene.beam.stretched(scene.beam.half_angle + self.half_angle_error * float(others[0]))
         if self.eye_radius_error:
             radius = scene.eye.radius + self.eye_radius_error * float(others[1])
             update["eye"] = scene.eye.model_copy(update={"radius": radius})

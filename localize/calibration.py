@@ -18,14 +18,13 @@ from numpy.typing import NDArray
 from conespot.localize.edge.fit import fit_edge
 from conespot.localize.edge.sandwich import EdgeFit
 from conespot.localize.image import AnyImage, Frame
-from conespot.localize.model.forward import tangents
-from conespot.localize.model.noise import NoiseModel, noise_of
+from conespot.localize.model.noise import NoiseModel
 from conespot.localize.model.prior import FREE, Estimate, Knowns, value, with_value
 from conespot.localize.model.solve import inverse
 from conespot.localize.outcome import LocalizationFailure
 from conespot.localize.start.search import find_start
-from conespot.scene.beam import CyclesBeam
 from conespot.scene.document import InputError
+from conespot.scene.pose import tangents
 from conespot.scene.scene import Scene
 
 Array = NDArray[np.float64]
@@ -110,7 +109,7 @@ def calibrate(
     last, held so tightly that all frames' equations belong to one point: otherwise the size of the whole scene, which
     no image tells, would seem to be known. Raises InputError if fewer than three frames can be fitted.
     """
-    sensor = noise or noise_of(scene)
+    sensor = noise or scene.sensor.noise
     nominal = _values(scene)
     widths = width.sigmas(scene)
     prior = 1.0 / np.square(widths)
@@ -143,7 +142,7 @@ def calibrate(
 
 
 def _has_softness(scene: Scene) -> bool:
-    return isinstance(scene.beam, CyclesBeam)
+    return scene.beam.softness is not None
 
 
 def _values(scene: Scene) -> Array:

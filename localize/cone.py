@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from conespot.localize.edge.fit import fit_edge
 from conespot.localize.image import AnyImage, Frame, Reference
-from conespot.localize.model.noise import NoiseModel, noise_of
+from conespot.localize.model.noise import NoiseModel
 from conespot.localize.model.prior import Estimate, Knowns
 from conespot.localize.outcome import LocalizationFailure, Outcome
 from conespot.localize.start.search import believed, find_starts
@@ -25,7 +25,7 @@ def cone(
     noise: NoiseModel | None = None,
 ) -> Outcome:
     """The tip from a checked image `[H, W]` or `[H, W, 3]`; `reference` (no spotlight) helps the search only."""
-    known, sensor, frame = knowns or Knowns(), noise or noise_of(scene), Frame(image, scene.sensor)
+    known, sensor, frame = knowns or Knowns(), noise or scene.sensor.noise, Frame(image, scene.sensor)
     starts = find_starts(frame, scene, reference)
     return believed(starts, scene, lambda start: edge_outcome(frame, Estimate(start.pose, scene), known, sensor))
 

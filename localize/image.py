@@ -15,14 +15,10 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from conespot.scene import InputError, Scene
-from conespot.scene.emva import Emva
-from conespot.scene.sensor import AnySensor, Srgb8
+from conespot.scene.sensor import ImageSensor
 
 AnyImage = NDArray[Any]  #: `[H, W]` or `[H, W, 3]` (RGB)
 Signal = NDArray[np.float32]  #: light, 1 is white
-#: share of a camera's range from which on a pixel counts as clipped. The noise of a pixel near the full well is cut off
-#: on one side: at 11,250 e- this is two sigmas of shot noise below it
-NEAR_FULL = 0.98
 
 
 def checked(image: ArrayLike, scene: Scene) -> AnyImage:
@@ -55,7 +51,7 @@ class Frame:
     """
 
     pixels: AnyImage
-    sensor: AnySensor
+    sensor: ImageSensor
 
     @property
     def side(self) -> int:
@@ -102,40 +98,26 @@ def white_level(image: AnyImage, scene: Scene) -> int:
     return scene.sensor.full_scale if image.dtype == np.uint16 else 255
 
 
-def linear_light(pixels: AnyImage, sensor: AnySensor) -> tuple[Signal, NDArray[np.bool_]]:
+def linear_light(pixels: AnyImage, sensor: ImageSensor) -> tuple[Signal, NDArray[np.bool_]]:
     """Signals [white] of pixel values of any shape, and which of them are clipped and only bounds.
 
-    uint8: 255 is white; uint16: the sensor's full scale; float: 1.0. An sRGB sensor's transfer is undone, a camera's
-    black level taken off. Raises InputError for any other type.
+    uint8: 255 is white; uint16: the sensor's full scale; float: 1.0. Raises InputError for any other type.
     """
-    if isinstance(sensor, Emva):
-        full = 255.0 if pixels.dtype == np.uint8 else sensor.full_scale if pixels.dtype == np.uint16 else 1.0
-        value = pixels.astype(np.float32) / np.float32(full)
-        black = sensor.black_level / sensor.full_scale
-        limit = black + NEAR_FULL * min(1.0 - black, sensor.saturation * sensor.gain / sensor.full_scale)
-        return value - np.float32(black), value >= limit
-    srgb = isinstance(sensor, Srgb8)
     if pixels.dtype == np.uint8 or pixels.dtype == np.uint16:
-        full = 255 if pixels.dtype == np.uint8 else min(sensor.full_scale, 65535)
-        table = _table(full, 256 if pixels.dtype == np.uint8 else 65536, srgb)
-        return table[pixels], np.asarray(pixels, np.uint16) >= full
+        full = 255 if pixels.dtype == np.uint8 else sensor.full_scale
+        signal, clipped = _tables(sensor, full, 256 if pixels.dtype == np.uint8 else 65536)
+        return signal[pixels], clipped[pixels]
     if np.issubdtype(pixels.dtype, np.floating):
-        signal = pixels.astype(np.float32)
-        clipped = signal >= 1.0
-        return (_srgb_decode(signal).astype(np.float32) if srgb else signal), clipped
+        share = pixels.astype(np.float32)
+        return sensor.decode(share.astype(float)).astype(np.float32), share >= sensor.clips_from
     raise InputError(f"an image must be uint8, uint16 or float, not {pixels.dtype}")
 
 
 @lru_cache(maxsize=8)
-def _table(full: int, size: int, srgb: bool) -> Signal:
-    code = np.minimum(np.arange(size) / full, 1.0)
-    return (_srgb_decode(code) if srgb else code).astype(np.float32)
-
-
-def _srgb_decode(code: ArrayLike) -> NDArray[np.float64]:
-    """IEC 61966-2-1."""
-    c = np.asarray(code, float)
-    return np.where(c <= 0.04045, c / 12.92, ((np.maximum(c, 0.04045) + 0.055) / 1.055) ** 2.4)
+def _tables(sensor: ImageSensor, full: int, size: int) -> tuple[Signal, NDArray[np.bool_]]:
+    """Signal, and whether it is clipped, of every pixel value `[size]`."""
+    share = np.minimum(np.arange(size) / full, 1.0)
+    return sensor.decode(share).astype(np.float32), share >= sensor.clips_from
 
 
 def grey8(image: AnyImage, scene: Scene) -> NDArray[np.uint8]:

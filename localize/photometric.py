@@ -11,7 +11,7 @@ from conespot.localize.cone import edge_outcome
 from conespot.localize.edge.fit import is_clipped, is_sharp
 from conespot.localize.field.fit import fit_patch
 from conespot.localize.image import AnyImage, Frame, Reference
-from conespot.localize.model.noise import NoiseModel, noise_of
+from conespot.localize.model.noise import NoiseModel
 from conespot.localize.model.prior import Estimate, Knowns
 from conespot.localize.model.solve import inverse
 from conespot.localize.outcome import LocalizationFailure, Outcome
@@ -29,7 +29,7 @@ def photometric(
     noise: NoiseModel | None = None,
 ) -> Outcome:
     """The tip from a checked image `[H, W]` or `[H, W, 3]`; `reference` is the same view in ambient light alone."""
-    known, sensor, frame = knowns or Knowns(), noise or noise_of(scene), Frame(image, scene.sensor)
+    known, sensor, frame = knowns or Knowns(), noise or scene.sensor.noise, Frame(image, scene.sensor)
 
     def localized(start: Start) -> Outcome:
         estimate = Estimate(start.pose, scene)

@@ -13,14 +13,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from conespot.localize.image import AnyImage, Frame, Reference, white_level
-from conespot.localize.model.noise import NoiseModel, noise_of
+from conespot.localize.model.noise import NoiseModel
 from conespot.localize.model.prior import Estimate, Knowns
 from conespot.localize.model.view import outlines
 from conespot.localize.outcome import LocalizationFailure, Outcome
 from conespot.localize.photometric import photometric
 from conespot.localize.start.search import find_start
 from conespot.scene.document import InputError
-from conespot.scene.emva import Emva
 from conespot.scene.scene import Scene
 
 Array = NDArray[np.float64]
@@ -36,7 +35,7 @@ class AmbientMap:
 
     def __init__(self, scene: Scene) -> None:
         self._scene = scene
-        self._black = scene.sensor.black_level if isinstance(scene.sensor, Emva) else 0.0
+        self._black = scene.sensor.black_level
         self._white = 1.0
         self._sum: NDArray[np.float32] | None = None
         self._levels = np.zeros(scene.camera.shape, np.float32)
@@ -116,6 +115,6 @@ def locate_sequence(
     ambient = AmbientMap(scene)
     learnt = sum(ambient.add(image) for image in frames())
     view = ambient.reference()
-    sensor = noise or noise_of(scene)
+    sensor = noise or scene.sensor.noise
     outcomes = [photometric(image, scene, knowns=knowns, reference=view, noise=sensor) for image in frames()]
     return SequenceResult(tuple(outcomes), learnt)

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import math
-from typing import Any
+from typing import Any, assert_never
 
 import numpy as np
 
 from conespot.render import spectral
 from conespot.scene import Pose, Scene, fundus
-from conespot.scene.beam import Beam, HardBeam, LinearBeam
+from conespot.scene.beam import BeamProfile, CyclesBeam, HardBeam, LinearBeam, TabulatedBeam
 from conespot.scene.pose import Array
 from conespot.scene.power import Power
 
@@ -31,15 +31,21 @@ def spotlight(mi: Any, scene: Scene) -> dict[str, Any]:
         "type": "spot",
         "intensity": spectral.emission(scene, scene.illumination, intensity * _PER_M2, 0.0),
         "cutoff_angle": math.degrees(beam.half_angle),
-        "beam_width": math.degrees(beam.beam_width if isinstance(beam, LinearBeam) else beam.half_angle),
         "to_world": mi.ScalarTransform4f(),
     }
-    if not isinstance(beam, (HardBeam, LinearBeam)):
-        emitter["texture"] = _profile_texture(mi, beam)
-    return emitter
+    match beam:
+        case HardBeam():
+            return {**emitter, "beam_width": math.degrees(beam.half_angle)}
+        case LinearBeam():
+            return {**emitter, "beam_width": math.degrees(beam.beam_width)}
+        case CyclesBeam() | TabulatedBeam():
+            profile = _profile_texture(mi, beam)
+            return {**emitter, "beam_width": math.degrees(beam.half_angle), "texture": profile}
+        case unknown:
+            assert_never(unknown)
 
 
-def _profile_texture(mi: Any, beam: Beam) -> dict[str, Any]:
+def _profile_texture(mi: Any, beam: BeamProfile) -> dict[str, Any]:
     """The profile over the square of tangents +-tan(half angle) that `spot` projects its texture onto."""
     t = ((np.arange(_PROFILE) + 0.5) / _PROFILE * 2.0 - 1.0) * math.tan(beam.half_angle)
     cos_angle = 1.0 / np.sqrt(1.0 + t[:, None] ** 2 + t[None, :] ** 2)

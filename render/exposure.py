@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any
+from typing import Any, assert_never
 
 import numpy as np
 from numpy.typing import NDArray
 
 from conespot.render import readout as emva
 from conespot.render.tile import Crop, Tile
+from conespot.scene import srgb
 from conespot.scene.emva import Emva
 from conespot.scene.sensor import Linear, Sensor, Srgb8
 
@@ -20,9 +21,13 @@ def encode(radiance: NDArray[np.floating[Any]], sensor: Srgb8 | Linear) -> NDArr
     `srgb8` follows IEC 61966-2-1; `linear` is proportional.
     """
     relative = np.clip(radiance / np.float32(sensor.white), 0.0, 1.0)
-    if isinstance(sensor, Srgb8):
-        low = 12.92 * relative
-        relative = np.where(relative <= 0.0031308, low, 1.055 * relative ** np.float32(1.0 / 2.4) - 0.055)
+    match sensor:
+        case Srgb8():
+            relative = srgb.encoded(relative)
+        case Linear():
+            pass
+        case unknown:
+            assert_never(unknown)
     values = np.floor(relative * sensor.full_scale + 0.5)
     return values.astype(np.uint8) if sensor.full_scale <= 255 else values.astype(np.uint16)
 
@@ -36,8 +41,13 @@ class Exposure:
     def __init__(self, background: NDArray[np.float32], sensor: Sensor) -> None:
         self._background = background
         self.sensor = sensor
-        if not isinstance(sensor, Emva):
-            self._encoded = np.concatenate([encode(band, sensor) for band in np.array_split(background, 16)])
+        match sensor:
+            case Srgb8() | Linear():
+                self._encoded = np.concatenate([encode(band, sensor) for band in np.array_split(background, 16)])
+            case Emva():
+                pass
+            case unknown:
+                assert_never(unknown)
 
     def frame(self, tiles: Sequence[Tile], power_w: float, seed: int = 0) -> NDArray[np.uint8] | NDArray[np.uint16]:
         """The image `[H, W]`, or `[H, W, C]` of several channels, with every spotlight at `power_w` [W].
@@ -45,61 +55,74 @@ class Exposure:
         `seed` decides the noise of an EMVA 1288 camera; a Bayer camera's raw frame is interpolated to three channels.
         """
         lit = [tile for tile in tiles if tile.radiance.size]
-        if isinstance(self.sensor, Emva):
-            return self._noisy(self.sensor, lit, power_w, seed)
-        image = self._encoded.copy()
-        if lit:
-            crop, radiance = self._lit(lit, power_w)
-            image[crop.slices] = encode(radiance, self.sensor)
-        return image[..., 0] if image.shape[-1] == 1 else image
+        match self.sensor:
+            case Emva() as camera:
+                return self._noisy(camera, lit, power_w, seed)
+            case Srgb8() | Linear() as sensor:
+                image = self._encoded.copy()
+                if lit:
+                    crop, radiance = self._lit(lit, power_w)
+                    image[crop.slices] = encode(radiance, sensor)
+                return image[..., 0] if image.shape[-1] == 1 else image
+            case unknown:
+                assert_never(unknown)
 
     def dark(self, tiles: Sequence[Tile], power_w: float, seed: int = 0) -> NDArray[np.uint8] | NDArray[np.uint16]:
         """The image without spotlights, at the exposure of the frame with these tiles at `power_w` [W]."""
-        if not isinstance(self.sensor, Emva):
-            return self.frame((), 0.0)
-        lit = [tile for tile in tiles if tile.radiance.size]
-        return self._digital(self._metered(self.sensor, lit, power_w), self._background, seed)
+        match self.sensor:
+            case Emva() as camera:
+                lit = [tile for tile in tiles if tile.radiance.size]
+                return self._digital(self._for_frame(camera, lit, power_w), self._background, seed)
+            case Srgb8() | Linear():
+                return self.frame((), 0.0)
+            case unknown:
+                assert_never(unknown)
 
     @property
     def meters_once(self) -> bool:
         """Whether the exposure time is still to be set, once and from the campaign's brightest frame, by `metered`."""
-        metering = self.sensor.metering if isinstance(self.sensor, Emva) else None
+        metering = self.sensor.metering
         return metering is not None and metering.each == "campaign"
 
     def metered(self, tiles: Sequence[Tile], power_w: float) -> Sensor:
         """The sensor with the exposure time that its metering asks for in this frame, and keeps; else as it is."""
-        lit = [tile for tile in tiles if tile.radiance.size]
-        if not isinstance(self.sensor, Emva) or self.sensor.metering is None or not lit:
-            return self.sensor
-        _, signal = self._lit(lit, power_w)
-        reached = merged(lit)[1].max(axis=-1) > 0.0
-        time = emva.metered_time(signal[reached], self.sensor)
-        return self.sensor.model_copy(update={"exposure_time": time})
+        match self.sensor:
+            case Emva() as camera:
+                return self._metered(camera, [tile for tile in tiles if tile.radiance.size], power_w)
+            case Srgb8() | Linear() as sensor:
+                return sensor
+            case unknown:
+                assert_never(unknown)
 
     def _lit(self, tiles: Sequence[Tile], power_w: float) -> tuple[Crop, NDArray[np.float32]]:
         crop, total = merged(tiles)
         return crop, self._background[crop.slices] + np.float32(power_w) * total
 
     def _noisy(
-        self, sensor: Emva, lit: Sequence[Tile], power_w: float, seed: int
+        self, camera: Emva, lit: Sequence[Tile], power_w: float, seed: int
     ) -> NDArray[np.uint8] | NDArray[np.uint16]:
         signal = self._background
         if lit:
             crop, radiance = self._lit(lit, power_w)
             signal = signal.copy()
             signal[crop.slices] = radiance
-        return self._digital(self._metered(sensor, lit, power_w), signal, seed)
+        return self._digital(self._for_frame(camera, lit, power_w), signal, seed)
 
-    def _metered(self, sensor: Emva, lit: Sequence[Tile], power_w: float) -> Emva:
-        if sensor.metering is None or sensor.metering.each != "frame":
-            return sensor
-        metered = self.metered(lit, power_w)
-        assert isinstance(metered, Emva)
-        return metered
+    def _metered(self, camera: Emva, lit: Sequence[Tile], power_w: float) -> Emva:
+        if camera.metering is None or not lit:
+            return camera
+        _, signal = self._lit(lit, power_w)
+        reached = merged(lit)[1].max(axis=-1) > 0.0
+        return camera.model_copy(update={"exposure_time": emva.metered_time(signal[reached], camera)})
+
+    def _for_frame(self, camera: Emva, lit: Sequence[Tile], power_w: float) -> Emva:
+        """The camera as it takes one frame: metered anew where it does that for each."""
+        anew = camera.metering is not None and camera.metering.each == "frame"
+        return self._metered(camera, lit, power_w) if anew else camera
 
     @staticmethod
-    def _digital(sensor: Emva, signal: NDArray[np.float32], seed: int) -> NDArray[np.uint8] | NDArray[np.uint16]:
-        raw = emva.expose(signal, sensor, seed)
+    def _digital(camera: Emva, signal: NDArray[np.float32], seed: int) -> NDArray[np.uint8] | NDArray[np.uint16]:
+        raw = emva.expose(signal, camera, seed)
         return emva.demosaic(raw) if signal.shape[-1] == 3 else raw
 
 

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from conespot.render.fundus_anatomy import COARSE, FINE, Anatomy, Map, texel_centres
-from conespot.scene import fundus
+from conespot.scene import fundus, srgb
 
 #: side of a photograph's texel [mm], centre of its round field and of the fovea (x, y), and radius of the field [px]
 TEXEL = 0.01
@@ -68,8 +68,7 @@ def _linear_photo() -> NDArray[np.float32]:
     photo = cv2.imdecode(data, cv2.IMREAD_COLOR)
     if photo is None:
         raise RuntimeError("render/data/retina.jpg cannot be decoded: the installation is damaged")
-    encoded = photo.astype(np.float32) / 255.0
-    linear = np.where(encoded <= 0.04045, encoded / 12.92, ((encoded + 0.055) / 1.055) ** 2.4).astype(np.float32)
+    linear = srgb.decoded(photo.astype(np.float32) / np.float32(255.0))
     height, width = photo.shape[:2]
     x, y = np.meshgrid(np.arange(width) + 0.5, np.arange(height) + 0.5)
     return np.asarray(cv2.remap(linear, *_reflected(x, y), cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE))

@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 import math
-from typing import Any
+from typing import Any, assert_never
 
 import numpy as np
 
 from conespot.render import spectral
 from conespot.scene import Eye, Scene
 from conespot.scene.eye import Globe
-from conespot.scene.retina import Fundus, FundusSite, PhotoRetina
+from conespot.scene.retina import Fundus, FundusSite, PhotoRetina, UniformRetina
 
 #: the wall lies this far outside the retina's mesh, relative to the radius, so that the mesh is what light meets
 _BEHIND = 2e-4
@@ -57,7 +57,12 @@ def near_plane(scene: Scene) -> float:
 
 
 def _wall(scene: Scene) -> dict[str, Any]:
-    retina = scene.retina
-    if isinstance(retina, (Fundus, FundusSite)):
-        return spectral.reflectance_spectrum(retina.site if isinstance(retina, FundusSite) else "perifovea")
-    return {"type": "uniform", "value": retina.mean if isinstance(retina, PhotoRetina) else retina.albedo}
+    match scene.retina:
+        case UniformRetina(albedo=albedo) | PhotoRetina(mean=albedo):
+            return {"type": "uniform", "value": albedo}
+        case FundusSite(site=site):
+            return spectral.reflectance_spectrum(site)
+        case Fundus():
+            return spectral.reflectance_spectrum("perifovea")
+        case unknown:
+            assert_never(unknown)

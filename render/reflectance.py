@@ -18,6 +18,7 @@ from conespot.render import spectral
 from conespot.render.fundus_anatomy import EXTENT as MAP_EXTENT
 from conespot.render.fundus_maps import fundus_maps
 from conespot.render.fundus_texture import fundus_texture
+from conespot.scene import srgb
 from conespot.scene.retina import Fundus, FundusSite, PhotoRetina, Retina, UniformRetina
 from conespot.scene.spectrum import Curve
 
@@ -95,8 +96,7 @@ def _photo_map(retina: PhotoRetina) -> NDArray[np.float32]:
     photo = cv2.imdecode(data, cv2.IMREAD_COLOR)
     if photo is None:
         raise RuntimeError("render/data/retina.jpg cannot be decoded: the installation is damaged")
-    encoded = photo.astype(np.float64) / 255.0
-    linear = np.where(encoded <= 0.04045, encoded / 12.92, ((encoded + 0.055) / 1.055) ** 2.4)
+    linear = srgb.decoded(photo.astype(np.float64) / np.float64(255.0))
     luminance = linear @ [0.0722, 0.7152, 0.2126]  # IEC 61966-2-1, blue first as OpenCV decodes
 
     centre_x, centre_y, radius = _FIELD

@@ -14,7 +14,6 @@ from conespot.render.stage import Stage
 from conespot.render.tile import Crop, Tile
 from conespot.scene import Pose, Scene
 from conespot.scene.illumination import Light
-from conespot.scene.retina import Fundus, FundusSite
 from conespot.scene.spectrum import Curve
 from conespot.scene.spotlights import spotlight_axes
 
@@ -106,8 +105,7 @@ class Renderer:
 
     @property
     def _background_samples(self) -> int:
-        spectral_retina = isinstance(self.scene.retina, (Fundus, FundusSite))
-        return SPECTRAL_BACKGROUND_SAMPLES if spectral_retina else BACKGROUND_SAMPLES
+        return SPECTRAL_BACKGROUND_SAMPLES if self.scene.retina.is_spectral else BACKGROUND_SAMPLES
 
     @functools.lru_cache(maxsize=2)  # noqa: B019 - a renderer lives as long as its process
     def _ambient(self, with_shaft: bool) -> Stage:

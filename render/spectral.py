@@ -7,15 +7,14 @@ wavelengths are sampled, a grey retina renders without any spectral noise.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, assert_never
 
 import numpy as np
 
 from conespot.scene import Scene, fundus
 from conespot.scene.emva import Emva
 from conespot.scene.illumination import Light
-from conespot.scene.retina import Fundus, FundusSite
-from conespot.scene.sensor import Linear
+from conespot.scene.sensor import Linear, Srgb8
 from conespot.scene.spectrum import Curve
 
 #: up to this many points a spectrum is given to Mitsuba as it is
@@ -34,12 +33,18 @@ class Channel:
 
 def unit(scene: Scene) -> str:
     """Unit of what the film integrates: radiance, or weighted with a camera's responsivity."""
-    return "A m-2 sr-1" if isinstance(scene.sensor, Emva) else "W m-2 sr-1"
+    match scene.sensor:
+        case Srgb8() | Linear():
+            return "W m-2 sr-1"
+        case Emva():
+            return "A m-2 sr-1"
+        case unknown:
+            assert_never(unknown)
 
 
 def has_water(scene: Scene) -> bool:
     """Whether the vitreous absorbs: in a living eye it does."""
-    return isinstance(scene.retina, (Fundus, FundusSite)) and scene.retina.water
+    return scene.retina.water
 
 
 def channels(scene: Scene, light: Light, responses: dict[str, Curve] | None = None) -> tuple[Channel, ...]:
@@ -49,7 +54,7 @@ def channels(scene: Scene, light: Light, responses: dict[str, Curve] | None = No
     """
     spectrum = light.spectrum
     wide = Curve(np.array([300.0, 1100.0]), np.ones(2))
-    if responses is None and not isinstance(scene.sensor, Linear):
+    if responses is None:
         responses = scene.sensor.responses
     found = []
     for name, response in (responses or {"radiance": wide}).items():

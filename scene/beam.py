@@ -7,7 +7,7 @@ A profile g is relative, 1 on the axis and 0 outside the cone. `flux_factor` is 
 from __future__ import annotations
 
 import math
-from typing import Annotated, Literal
+from typing import Annotated, Literal, Protocol
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -18,6 +18,32 @@ from conespot.scene.quantity import Angle, format_quantity
 
 Array = NDArray[np.float64]
 _HalfAngle = Annotated[Angle, Field(gt=0.0, lt=math.pi / 2.0)]
+
+
+class BeamProfile(Protocol):
+    """What every kind of beam says of itself; how Mitsuba and the forward model make it, they know for each."""
+
+    @property
+    def half_angle(self) -> float:
+        """Angle off the axis beyond which there is no light [rad]."""
+
+    @property
+    def flux_factor(self) -> float:
+        """Integral of the profile over solid angle [sr]."""
+
+    @property
+    def softness(self) -> float | None:
+        """Part of the cone over which the light falls; None for a profile without a ramp that could be fitted."""
+
+    @property
+    def words(self) -> str:
+        """The profile in words, as tables state it."""
+
+    def intensity(self, cos_angle: ArrayLike) -> Array:
+        """Relative radiant intensity at cosines of the angle off the axis, any shape."""
+
+    def stretched(self, half_angle: float) -> BeamProfile:
+        """The same profile over another half angle [rad]."""
 
 
 class HardBeam(Model):
@@ -34,6 +60,15 @@ class HardBeam(Model):
     def words(self) -> str:
         """The profile in words, as tables state it."""
         return f"hard, half angle {format_quantity(self.half_angle, 'angle')}"
+
+    @property
+    def softness(self) -> None:
+        """No ramp whose width could be fitted."""
+        return None
+
+    def stretched(self, half_angle: float) -> HardBeam:
+        """The same profile over another half angle [rad]: every angle in proportion."""
+        return self.model_copy(update={"half_angle": half_angle})
 
     @property
     def flux_factor(self) -> float:
@@ -59,6 +94,15 @@ class CyclesBeam(Model):
         """The profile in words, as tables state it."""
         soft = " (fully soft)" if self.blend == 1.0 else ""
         return f"Cycles blend {self.blend:g}{soft}, half angle {format_quantity(self.half_angle, 'angle')}"
+
+    @property
+    def softness(self) -> float:
+        """Part of the cone over which the light falls, the blend."""
+        return self.blend
+
+    def stretched(self, half_angle: float) -> CyclesBeam:
+        """The same profile over another half angle [rad]: cosines off the edge in proportion."""
+        return self.model_copy(update={"half_angle": half_angle})
 
     @property
     def flux_factor(self) -> float:
@@ -89,6 +133,16 @@ class LinearBeam(Model):
         """The profile in words, as tables state it."""
         width, half_angle = (format_quantity(angle, "angle") for angle in (self.beam_width, self.half_angle))
         return f"linear from {width}, half angle {half_angle}"
+
+    @property
+    def softness(self) -> None:
+        """No ramp whose width could be fitted."""
+        return None
+
+    def stretched(self, half_angle: float) -> LinearBeam:
+        """The same profile over another half angle [rad]: every angle in proportion."""
+        width = self.beam_width * half_angle / self.half_angle
+        return self.model_copy(update={"half_angle": half_angle, "beam_width": width})
 
     @property
     def flux_factor(self) -> float:
@@ -132,6 +186,15 @@ class TabulatedBeam(Model):
         return f"tabulated, half angle {format_quantity(self.half_angle, 'angle')}"
 
     @property
+    def softness(self) -> None:
+        """No ramp whose width could be fitted."""
+        return None
+
+    def stretched(self, half_angle: float) -> TabulatedBeam:
+        """The same profile over another half angle [rad]: every angle in proportion."""
+        return self.model_copy(update={"angles": tuple(a * half_angle / self.half_angle for a in self.angles)})
+
+    @property
     def flux_factor(self) -> float:
         """2 pi sum of the exact integrals of (linear in t) sin t over the table's intervals [sr]."""
         t, g = np.asarray(self.angles), np.asarray(self.intensities)
@@ -142,14 +205,3 @@ class TabulatedBeam(Model):
 
 
 Beam = Annotated[HardBeam | CyclesBeam | LinearBeam | TabulatedBeam, Field(discriminator="kind")]
-
-
-def stretched(beam: Beam, half_angle: float) -> Beam:
-    """The same profile over another half angle [rad]: every angle grows in proportion (in the cosine for `cycles`)."""
-    if isinstance(beam, TabulatedBeam):
-        angles = tuple(a * half_angle / beam.half_angle for a in beam.angles)
-        return beam.model_copy(update={"angles": angles})
-    update = {"half_angle": half_angle}
-    if isinstance(beam, LinearBeam):
-        update["beam_width"] = beam.beam_width * half_angle / beam.half_angle
-    return beam.model_copy(update=update)

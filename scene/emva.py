@@ -6,9 +6,11 @@ import math
 from typing import Annotated, Literal
 
 import numpy as np
+from numpy.typing import NDArray
 from pydantic import Field, model_validator
 
 from conespot.scene.model import Model
+from conespot.scene.noise import SensorNoise
 from conespot.scene.quantity import Length, Seconds, Wavelength, format_quantity
 from conespot.scene.spectrum import Curve, tabulated
 
@@ -16,6 +18,9 @@ from conespot.scene.spectrum import Curve, tabulated
 ELEMENTARY_CHARGE = 1.602176634e-19
 _VOLT_NM = 1239.841984
 _Edge = Annotated[Wavelength, Field(ge=300.0, le=1100.0)]
+#: share of the range of signals from which on a pixel counts as clipped. The noise of a pixel near the full well is cut
+#: off on one side: at 11,250 e- this is two sigmas of shot noise below it
+_NEAR_FULL = 0.98
 _Fraction = Annotated[float, Field(gt=0.0, le=1.0)]
 
 
@@ -134,6 +139,22 @@ class Emva(Model):
     def saturation(self) -> float:
         """Electrons at which the pixel clips: the full well or the converter, whichever comes first [e-]."""
         return min(self.full_well, (self.full_scale - self.black_level) / self.gain)
+
+    @property
+    def clips_from(self) -> float:
+        """Share of the largest value from which on a pixel is only a lower bound of its light."""
+        black = self.black_level / self.full_scale
+        return black + _NEAR_FULL * min(1.0 - black, self.saturation * self.gain / self.full_scale)
+
+    @property
+    def noise(self) -> SensorNoise:
+        """Shot and read noise where the largest value is white."""
+        levels = self.full_scale
+        return SensorNoise(levels=levels, electrons=levels / self.gain, read=self.read_noise)
+
+    def decode(self, share: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Signals [white] of shares of the largest value, any shape: without the black level."""
+        return share - self.black_level / self.full_scale
 
     @property
     def electrons_per_signal(self) -> float:

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from conespot.scene.pose import Pose
+from conespot.scene.pose import Pose, cone_rays
 from conespot.scene.scene import Scene
 from conespot.scene.spectrum import Curve, mean_of, tabulated
 from conespot.scene.spotlights import spotlight_axes
@@ -99,14 +99,9 @@ def scene_exposure(scene: Scene, poses: list[Pose], power_w: float) -> RetinalEx
 
 
 def _cone_points(scene: Scene, pose: Pose, axis: ArrayLike) -> NDArray[np.float64]:
-    a = np.asarray(axis, float)
-    helper = np.eye(3)[np.argmin(np.abs(a))]
-    u = np.cross(a, helper) / np.linalg.norm(np.cross(a, helper))
-    v = np.cross(a, u)
     tilt = np.linspace(0.0, 1.0, 13) * scene.beam.half_angle
     phi = np.linspace(0.0, 2.0 * math.pi, 24, endpoint=False)
-    t, p = (m.ravel() for m in np.meshgrid(tilt, phi))
-    rays = np.cos(t)[:, None] * a + np.sin(t)[:, None] * (np.cos(p)[:, None] * u + np.sin(p)[:, None] * v)
+    rays = cone_rays(np.asarray(axis, float), *(m.ravel() for m in np.meshgrid(tilt, phi)))
     return scene.surface.intersect(scene.eye, pose.apex, rays)
 
 

@@ -63,3 +63,27 @@ class Pose:
     def rotation(self) -> Array:
         """Rz(azimuth) Ry(tilt) Rz(roll) `[3, 3]`: takes (0, 0, -1) to the axis."""
         return rot_z(self.azimuth) @ rot_y(self.tilt) @ rot_z(self.roll)
+
+
+def tangents(axis: Array) -> tuple[Array, Array]:
+    """Unit vectors U, V `[3]` across the unit `axis` `[3]`: the first two columns of `Pose.rotation()` without roll.
+
+    U lies in the vertical plane through the axis. An axis' covariance is stated in this basis,
+    axis' = axis + du U + dv V [rad], and a cone's outline is counted in it.
+
+    >>> [part.round(12).tolist() for part in tangents(np.array([0.0, 0.0, -1.0]))]
+    [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0]]
+    """
+    frame = Pose(np.zeros(3), axis).rotation()
+    return frame[:, 0], frame[:, 1]
+
+
+def cone_rays(axis: Array, half_angle: ArrayLike, azimuth: ArrayLike) -> Array:
+    """Unit directions `[..., 3]` at angles `half_angle` off the unit `axis` `[3]` and `azimuth` from U to V [rad].
+
+    >>> cone_rays(np.array([0.0, 0.0, -1.0]), math.pi / 2.0, [0.0, math.pi / 2.0]).round(12).tolist()
+    [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0]]
+    """
+    u, v = tangents(axis)
+    b, phi = np.asarray(half_angle, float)[..., None], np.asarray(azimuth, float)[..., None]
+    return np.asarray(np.cos(b) * axis + np.sin(b) * (np.cos(phi) * u + np.sin(phi) * v))

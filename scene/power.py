@@ -8,7 +8,7 @@ from typing import Literal, assert_never
 
 from pydantic import Field
 
-from conespot.scene.beam import Beam
+from conespot.scene.beam import BeamProfile
 from conespot.scene.model import Model
 from conespot.scene.quantity import Watts
 
@@ -37,16 +37,16 @@ class Power(Model):
     value: Watts = Field(1.0, ge=0.0)
     convention: Literal["isotropic", "flux"] = "isotropic"
 
-    def axial_intensity(self, beam: Beam) -> float:
+    def axial_intensity(self, beam: BeamProfile) -> float:
         """On-axis radiant intensity I0 [W/sr]."""
         solid_angle = 4.0 * math.pi if self.convention == "isotropic" else beam.flux_factor
         return float(self.value / solid_angle)
 
-    def flux(self, beam: Beam) -> float:
+    def flux(self, beam: BeamProfile) -> float:
         """Radiant flux that leaves the tip in the cone [W]."""
         return self.axial_intensity(beam) * beam.flux_factor
 
-    def both(self, beam: Beam) -> BothConventions:
+    def both(self, beam: BeamProfile) -> BothConventions:
         """The power in both conventions."""
         intensity = self.axial_intensity(beam)
         return BothConventions(4.0 * math.pi * intensity, intensity * beam.flux_factor, intensity)

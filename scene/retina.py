@@ -17,6 +17,16 @@ class UniformRetina(Model):
     kind: Literal["uniform"] = "uniform"
     albedo: _Albedo = 0.1
 
+    @property
+    def is_spectral(self) -> bool:
+        """Whether the reflectance varies with wavelength: it is grey."""
+        return False
+
+    @property
+    def water(self) -> bool:
+        """Whether the vitreous absorbs: only in a living eye."""
+        return False
+
 
 class PhotoRetina(Model):
     """Lambertian grey albedo with the pattern of a fundus photograph.
@@ -36,6 +46,16 @@ class PhotoRetina(Model):
             raise ValueError(f"mean {self.mean} times contrast {self.contrast[1]} is an albedo above 1")
         return self
 
+    @property
+    def is_spectral(self) -> bool:
+        """Whether the reflectance varies with wavelength: it is grey."""
+        return False
+
+    @property
+    def water(self) -> bool:
+        """Whether the vitreous absorbs: only in a living eye."""
+        return False
+
 
 class FundusSite(Model):
     """Lambertian, everywhere the spectral reflectance of one site of Delori & Pflibsen's table (scene.fundus)."""
@@ -43,6 +63,11 @@ class FundusSite(Model):
     kind: Literal["site"] = "site"
     site: Literal["nasal", "perifovea", "fovea"] = "perifovea"
     water: bool = True  #: whether the vitreous absorbs like water, to and from the retina
+
+    @property
+    def is_spectral(self) -> bool:
+        """Whether the reflectance varies with wavelength."""
+        return True
 
 
 class Glint(Model):
@@ -72,6 +97,11 @@ class Fundus(Model):
     detail: float = Field(0.06, ge=0.0, le=0.3)
     water: bool = True  #: whether the vitreous absorbs like water, to and from the retina
     glint: Glint | None = None
+
+    @property
+    def is_spectral(self) -> bool:
+        """Whether the reflectance varies with wavelength."""
+        return True
 
 
 AnyRetina = UniformRetina | PhotoRetina | FundusSite | Fundus

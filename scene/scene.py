@@ -16,7 +16,7 @@ from conespot.scene.document import Document, find_document, merge, read_documen
 from conespot.scene.eye import Eye, Globe
 from conespot.scene.illumination import Ambient, FlatBand, Illumination
 from conespot.scene.model import Model
-from conespot.scene.pose import Pose
+from conespot.scene.pose import Pose, cone_rays
 from conespot.scene.power import Power
 from conespot.scene.retina import PhotoRetina, Retina
 from conespot.scene.sensor import Sensor, Srgb8
@@ -77,15 +77,9 @@ class Scene(Model):
         return np.asarray(self.eye.radius - self.surface.displacement(self.eye, direction) - distance)
 
     def outline(self, pose: Pose, spotlight: int, points: int = 256) -> NDArray[np.float64]:
-        """Where the edge of a spotlight's cone meets the surface `[points, 3]` [mm], counted round the axis."""
+        """Where the edge of a spotlight's cone meets the surface `[points, 3]` [mm], as `cone_rays` counts round it."""
         axis = spotlight_axes(pose, self.spotlights)[spotlight]
-        helper = np.eye(3)[np.argmin(np.abs(axis))]
-        u = np.cross(axis, helper)
-        u /= np.linalg.norm(u)
-        v = np.cross(axis, u)
-        phi = np.arange(points) * 2.0 * np.pi / points
-        b = self.beam.half_angle
-        rays = np.cos(b) * axis + np.sin(b) * (np.cos(phi)[:, None] * u + np.sin(phi)[:, None] * v)
+        rays = cone_rays(axis, self.beam.half_angle, np.arange(points) * 2.0 * np.pi / points)
         return self.surface.intersect(self.eye, pose.apex, rays)
 
 

@@ -2,17 +2,60 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Literal
+from collections.abc import Hashable
+from typing import Annotated, Literal, Protocol
 
 import numpy as np
+from numpy.typing import NDArray
 from pydantic import Field
 
-from conespot.scene.emva import EMVA_PRESETS, Emva
+from conespot.scene import srgb
+from conespot.scene.emva import EMVA_PRESETS, Emva, Metering
 from conespot.scene.model import Model, named
+from conespot.scene.noise import SensorNoise
 from conespot.scene.quantity import Radiance, format_quantity
 from conespot.scene.spectrum import Curve
 
+Array = NDArray[np.float64]
 _White = Annotated[Radiance, Field(gt=0.0)]
+
+
+class ImageSensor(Hashable, Protocol):
+    """What every kind of sensor says of itself; how it is exposed, `render.exposure` knows for each.
+
+    A share of 1 is the largest pixel value, a signal of 1 is white: the light that just shows as that.
+    """
+
+    @property
+    def full_scale(self) -> int:
+        """Largest pixel value."""
+
+    @property
+    def black_level(self) -> float:
+        """Pixel value without any light."""
+
+    @property
+    def clips_from(self) -> float:
+        """Share from which on a pixel is only a lower bound of its light."""
+
+    @property
+    def noise(self) -> SensorNoise:
+        """How noisy a pixel is."""
+
+    @property
+    def responses(self) -> dict[str, Curve] | None:
+        """Response of each channel over wavelength; None for one channel that weighs all light alike."""
+
+    @property
+    def metering(self) -> Metering | None:
+        """How the exposure time is found from the light, where it is."""
+
+    @property
+    def words(self) -> str:
+        """How radiance becomes values, in words as tables state it."""
+
+    def decode(self, share: Array) -> Array:
+        """Signals [white] of shares, any shape."""
 
 
 #: thirds of the visible range as a renderer of three colours takes them: a flat band shows equally in all
@@ -48,6 +91,34 @@ class Srgb8(Model):
             return None
         return {name: Curve(np.array(band), np.full(2, 3.0)) for name, band in _THIRDS.items()}
 
+    @property
+    def black_level(self) -> float:
+        """Pixel value without any light."""
+        return 0.0
+
+    @property
+    def clips_from(self) -> float:
+        """Share from which on a pixel is only a lower bound of its light."""
+        return 1.0
+
+    @property
+    def noise(self) -> SensorNoise:
+        """Quantization alone: the exposure is noiseless."""
+        return SensorNoise(levels=self.full_scale, srgb=True)
+
+    @property
+    def metering(self) -> None:
+        """No exposure time, so nothing to meter."""
+        return None
+
+    def decode(self, share: Array) -> Array:
+        """Signals [white] of shares of the largest value, any shape.
+
+        >>> Srgb8().decode(np.array([0.0, 0.5, 1.0])).round(4).tolist()
+        [0.0, 0.214, 1.0]
+        """
+        return srgb.decoded(share)
+
 
 class Linear(Model):
     """Pixel values proportional to radiance; `white` and above is the largest of `bits` bits."""
@@ -66,6 +137,35 @@ class Linear(Model):
         """How radiance becomes values, in words as tables state it."""
         return f"linear, {self.bits} bit, white {format_quantity(self.white, 'radiance')}"
 
+    @property
+    def responses(self) -> None:
+        """One channel that weighs all light alike."""
+        return None
+
+    @property
+    def black_level(self) -> float:
+        """Pixel value without any light."""
+        return 0.0
+
+    @property
+    def clips_from(self) -> float:
+        """Share from which on a pixel is only a lower bound of its light."""
+        return 1.0
+
+    @property
+    def noise(self) -> SensorNoise:
+        """Quantization alone: the exposure is noiseless."""
+        return SensorNoise(levels=self.full_scale)
+
+    @property
+    def metering(self) -> None:
+        """No exposure time, so nothing to meter."""
+        return None
+
+    def decode(self, share: Array) -> Array:
+        """Signals [white] of shares of the largest value, any shape: the same."""
+        return share
+
 
 AnySensor = Srgb8 | Linear | Emva
 SENSORS: dict[str, AnySensor] = {
@@ -79,7 +179,7 @@ SENSORS: dict[str, AnySensor] = {
 def sensor_name(sensor: AnySensor) -> str:
     """The name of a preset, or the kind (for a camera its chip) of a sensor of one's own."""
     alike = (name for name, known in SENSORS.items() if known == sensor)
-    return next(alike, sensor.chip if isinstance(sensor, Emva) else sensor.kind)
+    return next(alike, sensor.chip if sensor.kind == "emva" else sensor.kind)
 
 
 Sensor = Annotated[Annotated[AnySensor, Field(discriminator="kind")], named(SENSORS, "sensor")]

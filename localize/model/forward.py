@@ -20,20 +20,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from conespot.localize.model.profile import Profile
-from conespot.scene.pose import Pose
+from conespot.scene.pose import Pose, tangents
 from conespot.scene.scene import Scene
 from conespot.scene.spotlights import spotlight_axes
 
 Array = NDArray[np.float64]
-
-
-def tangents(axis: Array) -> tuple[Array, Array]:
-    """The first two columns `[3]`, `[3]` of `Pose.rotation()` without roll: unit vectors U, V across the unit `axis`.
-
-    An axis' covariance is stated in this basis: axis' = axis + du U + dv V [rad].
-    """
-    frame = Pose(np.zeros(3), axis).rotation()
-    return frame[:, 0], frame[:, 1]
 
 
 def rotation_basis(axis: Array) -> Array:

@@ -12,11 +12,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from conespot.localize.model.forward import moved, tangents
+from conespot.localize.model.forward import moved
 from conespot.localize.model.profile import Profile
-from conespot.scene.beam import CyclesBeam, stretched
 from conespot.scene.document import InputError
-from conespot.scene.pose import Pose
+from conespot.scene.pose import Pose, tangents
 from conespot.scene.scene import Scene
 
 Array = NDArray[np.float64]
@@ -70,16 +69,16 @@ def value(scene: Scene, name: str) -> float:
     if name == "half_angle":
         return scene.beam.half_angle
     if name == "softness":
-        if not isinstance(scene.beam, CyclesBeam):
+        if scene.beam.softness is None:
             raise InputError(f"knowns: a {scene.beam.kind} beam has no softness; describe it as a cycles beam")
-        return scene.beam.blend
+        return scene.beam.softness
     return scene.eye.radius if name == "eye_radius" else scene.camera.height
 
 
 def with_value(scene: Scene, name: str, new: float) -> Scene:
     """The scene with another value of one of `FREE` [rad, 1, mm, mm]."""
     if name == "half_angle":
-        return scene.model_copy(update={"beam": stretched(scene.beam, new)})
+        return scene.model_copy(update={"beam": scene.beam.stretched(new)})
     if name == "softness":
         # a fit may look a little beyond the softest beam there is
         return scene.model_copy(update={"beam": scene.beam.model_copy(update={"blend": max(new, _HARDEST)})})

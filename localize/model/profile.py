@@ -7,8 +7,10 @@ angle off the axis for hard and Cycles beams, minus the angle for linear and tab
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from typing import assert_never
 
 import numpy as np
 from numpy.typing import NDArray
@@ -30,23 +32,27 @@ class Profile:
     @classmethod
     def of(cls, beam: Beam) -> Profile:
         """The profile of a beam."""
-        b = beam.half_angle
-        if isinstance(beam, HardBeam):
-            return cls(np.array([math.cos(b)]), np.array([[1.0]]), True, b)
-        if isinstance(beam, CyclesBeam):
-            low = math.cos(b)
-            ramp = beam.blend * (1.0 - low)
-            pieces = np.array([[0.0, 0.0, 3.0 / ramp**2, -2.0 / ramp**3], [1.0, 0.0, 0.0, 0.0]])
-            return cls(np.array([low, low + ramp]), pieces, True, b)
-        if isinstance(beam, LinearBeam):
-            angles, values = np.array([beam.beam_width, beam.half_angle]), np.array([1.0, 0.0])
-        else:
-            assert isinstance(beam, TabulatedBeam)
-            angles, values = np.asarray(beam.angles), np.asarray(beam.intensities)
-        w = -angles[::-1]
-        g = values[::-1]
+        match beam:
+            case HardBeam():
+                return cls(np.array([math.cos(beam.half_angle)]), np.array([[1.0]]), True, beam.half_angle)
+            case CyclesBeam():
+                low = math.cos(beam.half_angle)
+                ramp = beam.blend * (1.0 - low)
+                pieces = np.array([[0.0, 0.0, 3.0 / ramp**2, -2.0 / ramp**3], [1.0, 0.0, 0.0, 0.0]])
+                return cls(np.array([low, low + ramp]), pieces, True, beam.half_angle)
+            case LinearBeam():
+                return cls._broken_line([beam.beam_width, beam.half_angle], [1.0, 0.0])
+            case TabulatedBeam():
+                return cls._broken_line(beam.angles, beam.intensities)
+            case unknown:
+                assert_never(unknown)
+
+    @classmethod
+    def _broken_line(cls, angles: Sequence[float], intensities: Sequence[float]) -> Profile:
+        """The profile that is linear in the angle off the axis [rad] between a table's."""
+        w, g = -np.asarray(angles)[::-1], np.asarray(intensities)[::-1]
         slopes = np.append(np.diff(g) / np.diff(w), 0.0)
-        return cls(w, np.stack([g, slopes], axis=1), False, b)
+        return cls(w, np.stack([g, slopes], axis=1), False, angles[-1])
 
     def variable(self, cosine: Array) -> tuple[Array, Array | float]:
         """w at cosines of the angle off the axis, and |dw / dcosine|."""

@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from conespot.localize.image import Frame, Reference
-from conespot.localize.model.forward import moved, tangents
+from conespot.localize.model.forward import moved
 from conespot.localize.model.outline import distances
 from conespot.localize.model.prior import Estimate
 from conespot.localize.model.residual import spread
@@ -25,7 +25,7 @@ from conespot.localize.start.rays import rays_across, support
 from conespot.localize.start.rig import poses_on
 from conespot.localize.start.rings import Overview, Ring, find_rings
 from conespot.localize.start.settings import START
-from conespot.scene.pose import Pose
+from conespot.scene.pose import Pose, tangents
 from conespot.scene.scene import Scene
 
 Array = NDArray[np.float64]

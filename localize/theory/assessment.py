@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, assert_never
 
 import numpy as np
 
@@ -19,6 +19,7 @@ from conespot.scene.document import InputError
 from conespot.scene.emva import Emva
 from conespot.scene.pose import Pose
 from conespot.scene.scene import Scene
+from conespot.scene.sensor import Linear, Srgb8
 from conespot.scene.surface import bump_grid
 
 Record = dict[str, str | float]
@@ -67,11 +68,15 @@ def electrons_of(scene: Scene) -> Electrons:
 
     Without metering a camera's brightest light is taken to be 80 % of saturation.
     """
-    if not isinstance(scene.sensor, Emva):
-        return Electrons()
-    camera = scene.sensor
-    level = camera.metering.level if camera.metering else 0.8
-    return Electrons(level * camera.saturation, math.sqrt(camera.read_noise**2 + 1.0 / (12.0 * camera.gain**2)))
+    match scene.sensor:
+        case Srgb8() | Linear():
+            return Electrons()
+        case Emva() as camera:
+            level = camera.metering.level if camera.metering else 0.8
+            background = math.sqrt(camera.read_noise**2 + 1.0 / (12.0 * camera.gain**2))
+            return Electrons(level * camera.saturation, background)
+        case unknown:
+            assert_never(unknown)
 
 
 def tied(free: Bound, scene: Scene, pose: Pose, rcm_sigma_mm: float | None) -> Bound:

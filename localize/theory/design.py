@@ -65,7 +65,7 @@ def compare_designs(
     """
     places = [np.array(tip, float) for tip in tips]
     known = knowns or Knowns(rcm_sigma_mm=None)
-    own = scene.beam.blend if isinstance(scene.beam, CyclesBeam) else 0.0
+    own = scene.beam.softness or 0.0
     plans: list[tuple[float, float, tuple[Spotlight, ...], float]] = []
     plans += [(angle, own, scene.spotlights, 0.0) for angle in half_angles]
     plans += [(scene.beam.half_angle, soft, scene.spotlights, 0.0) for soft in softness]

@@ -3,11 +3,11 @@
 import numpy as np
 import pytest
 
-from conespot.localize.model.forward import light, look, moved, tangents, window
+from conespot.localize.model.forward import light, look, moved, window
 from conespot.localize.model.profile import Profile
 from conespot.scene.beam import CyclesBeam, HardBeam, LinearBeam, TabulatedBeam
 from conespot.scene.camera import Camera
-from conespot.scene.pose import Pose
+from conespot.scene.pose import Pose, tangents
 from conespot.scene.scene import Scene
 
 BEAMS = [

@@ -11,7 +11,6 @@ from conespot.localize.edge.saturated import SaturatedFit
 from conespot.localize.edge.strips import Strips, score_covariance
 from conespot.localize.image import Frame
 from conespot.localize.model.forward import ambient_irradiance, light, look, moved, window
-from conespot.localize.model.noise import noise_of
 from conespot.localize.model.prior import Estimate
 from conespot.localize.model.profile import Profile
 from conespot.localize.theory.bounds import cramer_rao
@@ -117,7 +116,7 @@ def test_a_sharp_patch_clipped_throughout_is_measured_by_its_clipped_pixels(cont
     scene = Scene(beam=HardBeam(), camera=Camera(resolution=1000), sensor=Srgb8())
     for k, tip in enumerate(TIPS):
         pose = scene.pose(tip)
-        fit = fitted(clipped(scene, pose, contrast), scene, near(pose, k), Knowns(0.01), noise_of(scene))
+        fit = fitted(clipped(scene, pose, contrast), scene, near(pose, k), Knowns(0.01), scene.sensor.noise)
         assert isinstance(fit, SaturatedFit)
         assert fit.settled
         assert error(fit, pose) < 15.0
@@ -129,7 +128,7 @@ def test_channels_that_clip_at_different_places_are_fitted_jointly():
     pose = scene.pose(TIPS[1])
     contrasts = (2000.0, 500.0, 60.0)
     colour = np.stack([clipped(scene, pose, c, albedo=vessels) for c in contrasts], axis=-1)
-    fit = fitted(colour, scene, near(pose, 2), Knowns(0.01), noise_of(scene))
+    fit = fitted(colour, scene, near(pose, 2), Knowns(0.01), scene.sensor.noise)
     assert len(fit.gains) == 3
     assert np.all(np.diff(fit.gains) < 0.0)
     assert error(fit, pose) < 5.0
