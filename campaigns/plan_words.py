@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,10 +14,20 @@ from conespot.render.rim import rim_pixels
 from conespot.scene import Pose
 from conespot.scene.exposure_limits import RetinalExposure, scene_exposure
 
-#: measured on one core: samples traced [1/s], and seconds a pixel to expose and localize a frame once
-RAYS_PER_SECOND = 12e6
-SECONDS_PER_PIXEL = 3e-9
 _MOST_CASES = 60
+
+
+@dataclass(frozen=True)
+class Pace:
+    """What one core does, as `python benchmarks/pace.py` measures it: good enough to tell minutes from hours."""
+
+    rays_per_second: float = 12e6  #: samples traced
+    seconds_per_pixel: float = 3e-9  #: to expose a frame and localize it once
+    seconds_per_scene: float = 3.0  #: to load a scene and compile its kernels
+    background_rays: float = 4.0  #: samples a pixel of the view without spotlights, as `render.renderer` takes them
+
+
+PACE = Pace()
 
 
 def describe(plan: Plan, workers: int) -> Iterator[str]:
@@ -62,10 +73,8 @@ def _exposures(plan: Plan) -> Iterator[str]:
 
 def _both(case: Case) -> str:
     """The power of one spotlight in both conventions."""
-    scene = case.scene
-    power = scene.power
-    isotropic = 4.0 * math.pi * power.axial_intensity(scene.beam)
-    return f"{isotropic:.4g} W isotropic = {1e3 * power.flux(scene.beam):.4g} mW flux"
+    both = case.scene.power.both(case.scene.beam)
+    return f"{both.isotropic_w:.4g} W isotropic = {1e3 * both.flux_w:.4g} mW flux"
 
 
 def _seconds(plan: Plan) -> float:
@@ -76,11 +85,12 @@ def _seconds(plan: Plan) -> float:
         pixels = math.prod(group.scene.camera.shape)
         if group.scene_key not in seen:
             seen.add(group.scene_key)
-            total += 3.0 + 4.0 * pixels / RAYS_PER_SECOND
+            total += PACE.seconds_per_scene + PACE.background_rays * pixels / PACE.rays_per_second
         poses = len(group.positions)
         spotlights = range(len(group.scene.spotlights))
-        rays = [sum(_tile_rays(group, group.pose(int(i)), k) for k in spotlights) for i in _spread(poses, 5)]
-        total += poses * (float(np.mean(rays)) / RAYS_PER_SECOND + group.rows * pixels * SECONDS_PER_PIXEL)
+        rays = [sum(tile_rays(group, group.pose(int(i)), k) for k in spotlights) for i in _spread(poses, 5)]
+        traced, found = float(np.mean(rays)) / PACE.rays_per_second, group.rows * pixels * PACE.seconds_per_pixel
+        total += poses * (traced + found)
     return total
 
 
@@ -89,7 +99,7 @@ def _spread(count: int, most: int) -> NDArray[np.int_]:
     return np.unique(np.linspace(0, count - 1, most).astype(int))
 
 
-def _tile_rays(group: Group, pose: Pose, spotlight: int) -> float:
+def tile_rays(group: Group, pose: Pose, spotlight: int) -> float:
     """Samples traced for the rectangle that holds a spotlight's patch, and for its edge."""
     scene = group.scene
     edge = scene.camera.project(scene.outline(pose, spotlight, points=32))
