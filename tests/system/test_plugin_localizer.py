@@ -3,21 +3,22 @@
 import os
 import subprocess
 import sys
+from pathlib import Path
 
 import pandas as pd
 import pytest
 
+#: the localizer that the documentation adds, as it stands there
+EXTENDING = (Path(__file__).parents[2] / "docs" / "extending.md").read_text("utf-8")
+ADDED = EXTENDING.partition(" # beacon.py\n")[2].partition(" # pyproject.toml")[0]
+BRIGHTEST = "".join(f"{line[1:]}\n" for line in ADDED.splitlines() if line.startswith("+"))
 BEACON = """\
-import numpy as np
-from conespot.localize import Localization, Localizer
-from conespot.scene import Pose
 
-def centre(image, scene):
-    return Localization(np.array([0.0, 0.0, 4.0]), Pose.through([0.0, 0.0, 4.0], scene.instrument.rcm).axis)
+from conespot.localize import Localizer
 
 def _told(image, scene, beside):
     assert beside.truth is None and beside.knowns.rcm_sigma_mm == 0.2
-    return centre(image, scene)
+    return brightest(image, scene)
 
 told = Localizer(_told, threshold="none (a guess)", ambiguity="none (a guess)", takes_knowledge=True)
 
@@ -43,14 +44,14 @@ def leaves(image, scene):
 
 none = 5
 """
-NAMES = ["centre", "told", "seer", "raises", "writes", "answers_a_word", "answers_nan", "leaves"]
+NAMES = ["brightest", "told", "seer", "raises", "writes", "answers_a_word", "answers_nan", "leaves"]
 
 
 @pytest.fixture(scope="module")
 def installed(tmp_path_factory):
     """A folder on the path with a module, and the metadata that makes it an installed distribution."""
     site = tmp_path_factory.mktemp("site")
-    (site / "beacon.py").write_text(BEACON)
+    (site / "beacon.py").write_text(BRIGHTEST + BEACON)
     metadata = site / "beacon-1.0.dist-info"
     metadata.mkdir()
     (metadata / "METADATA").write_text("Metadata-Version: 2.1\nName: beacon\nVersion: 1.0\n")
@@ -93,7 +94,7 @@ def test_a_campaign_uses_them_and_what_breaks_is_a_failure_row(campaign, tmp_pat
     assert done.returncode == 0, done.stderr
     rows = pd.read_csv(tmp_path / "run" / "errors.csv", keep_default_na=False).set_index("localizer")
     assert dict(zip(rows.index, rows["reason"], strict=True)) | {"paper-code-float": ""} == {
-        "centre": "",
+        "brightest": "",
         "told": "",
         "seer": "",
         "raises": "raises raised RuntimeError: no such luck",
@@ -112,7 +113,7 @@ def test_a_campaign_uses_them_and_what_breaks_is_a_failure_row(campaign, tmp_pat
     [
         ("gone", "localizer 'gone' (no_such_module:f of beacon 1.0) cannot be loaded: ModuleNotFoundError"),
         ("none", "localizer 'none' (beacon:none of beacon 1.0) is no conespot.localize.localizer.Localizer"),
-        ("centr", "unknown localizer 'centr'; did you mean 'centre'?"),
+        ("brightes", "unknown localizer 'brightes'; did you mean 'brightest'?"),
     ],
 )
 def test_one_that_cannot_be_used_is_refused_in_a_sentence_with_its_line(campaign, tmp_path, name, says):
