@@ -7,9 +7,8 @@ of image and scene. Its name is that of the entry point.
 from __future__ import annotations
 
 import functools
-import re
 from dataclasses import replace
-from importlib.metadata import EntryPoint, entry_points
+from importlib.metadata import EntryPoint
 from typing import Any
 
 import numpy as np
@@ -18,37 +17,27 @@ from conespot.localize.image import AnyImage
 from conespot.localize.localizer import Beside, Localizer
 from conespot.localize.outcome import Localization, LocalizationFailure, Outcome
 from conespot.scene import InputError, Scene
+from conespot.scene.installed import described, loaded, offered, sentence
 
 GROUP = "conespot.localizers"
-#: what the rows of a run can hold
-_NAME = re.compile(r"[\w.+-]{1,60}", re.ASCII)
 _LONGEST_WORDS, _LONGEST_REASON = 200, 500
 
 
-@functools.cache
 def plugins() -> dict[str, EntryPoint]:
     """Every localizer that installed packages offer, by name and not yet loaded; of equal names the first found."""
-    found: dict[str, EntryPoint] = {}
-    for entry in entry_points(group=GROUP):
-        if _NAME.fullmatch(entry.name):
-            found.setdefault(entry.name, entry)
-    return dict(sorted(found.items()))
+    return offered(GROUP)
 
 
 @functools.cache
 def load_plugin(entry: EntryPoint) -> Localizer:
     """The localizer of an entry point. Raises InputError if it cannot be loaded or is none."""
-    offered = f"localizer '{entry.name}' ({entry.value}{_package(entry)})"
-    try:
-        value = entry.load()
-    except (Exception, SystemExit) as error:
-        raise InputError(f"{offered} cannot be loaded: {_sentence(error)}; mend or uninstall that package") from None
+    value, which = loaded(entry, "localizer"), f"localizer {described(entry)}"
     if not isinstance(value, Localizer) and (isinstance(value, type) or not callable(value)):
-        raise InputError(f"{offered} is no conespot.localize.localizer.Localizer and no function of image and scene")
+        raise InputError(f"{which} is no conespot.localize.localizer.Localizer and no function of image and scene")
     localizer = value if isinstance(value, Localizer) else Localizer.plain(value)
     for words in (localizer.threshold, localizer.ambiguity):
         if not (isinstance(words, str) and words.isprintable() and 0 < len(words) <= _LONGEST_WORDS):
-            raise InputError(f"{offered}: threshold and ambiguity must be a line of up to {_LONGEST_WORDS} characters")
+            raise InputError(f"{which}: threshold and ambiguity must be a line of up to {_LONGEST_WORDS} characters")
 
     def answer(image: AnyImage, scene: Scene, beside: Beside) -> Outcome:
         return _answer(entry.name, localizer, image, scene, beside)
@@ -64,7 +53,7 @@ def _answer(name: str, localizer: Localizer, image: AnyImage, scene: Scene, besi
         found: object = localizer.run(seen, scene, beside)
         wrong = _wrong(found)
     except (Exception, SystemExit) as error:
-        return LocalizationFailure(f"{name} raised {_sentence(error)}")
+        return LocalizationFailure(f"{name} raised {sentence(error)}")
     if isinstance(found, LocalizationFailure) and wrong is None:
         return found
     if isinstance(found, Localization) and wrong is None:
@@ -103,11 +92,3 @@ def _plain(found: Localization) -> Localization:
     covariance = None if found.covariance is None else np.asarray(found.covariance, float)
     roll, spread = (None if v is None else float(v) for v in (found.roll, found.spread_mm))
     return Localization(np.asarray(found.apex_mm, float), np.asarray(found.axis, float), covariance, spread, roll)
-
-
-def _sentence(error: BaseException) -> str:
-    return f"{type(error).__name__}: {' '.join(str(error).split())[:_LONGEST_REASON]}".rstrip(": ")
-
-
-def _package(entry: EntryPoint) -> str:
-    return "" if entry.dist is None else f" of {entry.dist.name} {entry.dist.version}"

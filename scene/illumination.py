@@ -6,19 +6,34 @@ Every spectrum integrates to 1 over wavelength, so that a power in watts (or an 
 from __future__ import annotations
 
 import math
+from importlib.metadata import EntryPoint
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, Literal, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import BeforeValidator, Field, ValidationInfo, model_validator
+from pydantic import BeforeValidator, Field, ValidationError, ValidationInfo, model_validator
 
+from conespot.scene.document import InputError
+from conespot.scene.installed import described, loaded, offered, sentence
 from conespot.scene.model import Model, unknown_name
 from conespot.scene.quantity import Angle, Irradiance, Wavelength
 from conespot.scene.spectrum import Curve, read_curve, tabulated
 
 _Visible = Annotated[Wavelength, Field(ge=300.0, le=1100.0)]
 _Name = Annotated[str, Field(pattern=r"^[\w .+-]{1,40}$")]
+
+
+#: entry points by which other packages offer lamps
+GROUP = "conespot.illuminants"
+
+
+class Illuminant(Protocol):
+    """What every kind of light says of itself."""
+
+    @property
+    def spectrum(self) -> Curve:
+        """Spectral density [1/nm]; what other packages offer is scaled to integral 1."""
 
 
 class FlatBand(Model):
@@ -109,7 +124,46 @@ class MeasuredLight(Model):
         return Curve(pairs[:, 0], pairs[:, 1]).normalised()
 
 
-Light = FlatBand | Lamp | Line | MeasuredLight
+class InstalledLight(Model):
+    """A lamp that another installed package offers: an entry point of the group `conespot.illuminants`.
+
+    Its value is an `Illuminant`. A file names it; the resolved scene holds its spectrum, so that a run can be repeated
+    whatever becomes of the package.
+    """
+
+    kind: Literal["installed"] = "installed"
+    name: _Name
+    package: str  #: and its version
+    points: tuple[tuple[float, float], ...] = Field(min_length=2, max_length=100_000)
+
+    @classmethod
+    def of(cls, entry: EntryPoint) -> InstalledLight:
+        """The lamp of an entry point. Raises InputError, naming the package, if it cannot be loaded or is none."""
+        value = loaded(entry, "light")
+        try:
+            curve = getattr(value, "spectrum", None)
+            if not isinstance(curve, Curve):
+                raise TypeError("its spectrum is no conespot.scene.spectrum.Curve")
+            pairs = zip(curve.wavelengths.tolist(), curve.values.tolist(), strict=True)
+            package = f"{entry.dist.name} {entry.dist.version}" if entry.dist else entry.value
+            return cls(name=entry.name, package=package, points=tuple(pairs))
+        except (Exception, SystemExit) as error:
+            reason = error.errors()[0]["msg"] if isinstance(error, ValidationError) else sentence(error)
+            raise InputError(f"light {described(entry)} is none: {reason}; mend or uninstall that package") from None
+
+    @model_validator(mode="after")
+    def _a_light(self) -> InstalledLight:
+        if self.spectrum.low < 300.0 or self.spectrum.high > 1100.0:
+            raise ValueError("wavelengths must lie in 300 to 1100 nm")
+        return self
+
+    @property
+    def spectrum(self) -> Curve:
+        """Spectral density with integral 1 [1/nm]."""
+        return Curve(*np.array(self.points).T).normalised()
+
+
+Light = FlatBand | Lamp | Line | MeasuredLight | InstalledLight
 LIGHTS: dict[str, Light] = {
     "white": FlatBand(),
     **{name: Lamp.model_validate({"name": name}) for name in LAMPS},
@@ -120,9 +174,15 @@ LIGHTS: dict[str, Light] = {
 
 def _named_light(value: Any, info: ValidationInfo) -> Any:
     if isinstance(value, str):
-        if value not in LIGHTS:
-            raise unknown_name(value, list(LIGHTS), "light")
-        return LIGHTS[value]
+        if value in LIGHTS:
+            return LIGHTS[value]
+        others = offered(GROUP)
+        if value not in others:
+            raise unknown_name(value, [*LIGHTS, *others], "light")
+        try:
+            return InstalledLight.of(others[value])
+        except InputError as error:
+            raise ValueError(str(error)) from None
     if isinstance(value, dict) and value.get("kind") == "csv" and "points" not in value and "file" in value:
         folder = Path((info.context or {}).get("folder", "."))
         value = {**value, "points": read_curve(folder / str(value["file"]))}
