@@ -55,20 +55,29 @@ class Reflectance:
             return _photo_map(self.retina)
         raise TypeError("a spectral retina has no grey albedo")
 
-    def bsdf(self, mi: Any, dr: Any, band: Curve | None = None) -> dict[str, Any]:
-        """The Mitsuba BSDF: Lambertian, under a dielectric coat where the retina has a glint.
+    @property
+    def is_grey(self) -> bool:
+        """Whether all wavelengths are reflected alike."""
+        return isinstance(self.retina, (UniformRetina, PhotoRetina))
 
-        `band`: for the scalar variant, the weight over which a spectral map is averaged.
-        """
-        texture = self._texture(mi, dr, band)
+    @property
+    def is_even(self) -> bool:
+        """Whether it is the same everywhere."""
+        return isinstance(self.retina, (UniformRetina, FundusSite))
+
+    def bsdf(self, mi: Any, texture: Any) -> dict[str, Any]:
+        """The Mitsuba BSDF: Lambertian, under a dielectric coat where the retina has a glint."""
         glint = self.retina.glint if isinstance(self.retina, Fundus) else None
         if glint is None:
             return {"type": "diffuse", "reflectance": texture}
         coat = {"int_ior": glint.index, "ext_ior": VITREOUS_INDEX, "alpha": glint.roughness, "distribution": "ggx"}
         return {"type": "roughplastic", "diffuse_reflectance": texture, **coat}
 
-    def _texture(self, mi: Any, dr: Any, band: Curve | None) -> Any:
-        """The Mitsuba texture, over the texture coordinates that `texture_coordinates` gives."""
+    def texture(self, mi: Any, dr: Any, band: Curve | None = None) -> Any:
+        """The Mitsuba texture, over the texture coordinates that `texture_coordinates` gives.
+
+        `band`: for the scalar variant, the weight over which a spectral map is averaged.
+        """
         if isinstance(self.retina, UniformRetina):
             return {"type": "uniform", "value": self.retina.albedo}
         if isinstance(self.retina, FundusSite):

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from conespot.render import emitters, kernel, shaft, spectral
+from conespot.render import emitters, kernel, monte_carlo, shaft, spectral
 from conespot.render.rim import rim_pixels
 from conespot.render.stage import Stage
 from conespot.render.tile import Crop, Tile
@@ -31,18 +31,27 @@ class Renderer:
     """Renders radiance: spotlight tiles at 1 W, and the background without spotlights.
 
     Light adds up and is linear in power, so a frame at any power is background + power * sum of tiles; the scene's
-    own power value plays no part here, its convention does. `samples` a pixel are stratified over the pixel's area;
-    pixels on a patch's hard edge, which need many more than any other, get `edge_samples` if that is not 0.
+    own power value plays no part here, its convention does. `samples` a pixel are stratified over the pixel's area, and
+    so are the few that pixels get where these leave no more noise than `noise`, relative to the pixel's radiance: what
+    the sensor forgives by default, and 0 gives every pixel all of them. Pixels on a patch's hard edge, which need many
+    more than any other, get `edge_samples` if that is not 0.
     Channels are those of the scene's sensor, in W m-2 sr-1 (or A m-2 sr-1 for an EMVA 1288 camera), or `responses`.
     Interreflection adds to the spotlights alone; the microscope's light comes in from outside and is seen once.
     Raises KernelError if Mitsuba cannot be used.
     """
 
     def __init__(
-        self, scene: Scene, *, samples: int = 16, edge_samples: int = 0, responses: dict[str, Curve] | None = None
+        self,
+        scene: Scene,
+        *,
+        samples: int = 16,
+        edge_samples: int = 0,
+        noise: float | None = None,
+        responses: dict[str, Curve] | None = None,
     ) -> None:
         self.scene = scene
         self.samples, self.edge_samples = samples, edge_samples
+        self.noise = monte_carlo.tolerance(scene.sensor) if noise is None else noise
         self.rendered = 0  #: tiles and backgrounds rendered so far
         self._mi, _, self._kernel = kernel.load()
         self._shaft = scene.instrument.shaft
@@ -64,12 +73,22 @@ class Renderer:
         if self._shaft is not None:
             self._lit.update(shaft.placed(self._mi, self._shaft, pose))
         self.rendered += 1
-        radiance = self._lit.render(crop, self.samples, seed)
+        radiance = self._radiance(crop, seed)
         if self.edge_samples > self.samples and radiance.size:
             pixels = crop.pixels(shape[1])
             edge = np.isin(pixels, rim_pixels(self.scene, pose, spotlight))
             radiance[edge.reshape(crop.height, crop.width)] = self._lit.pixels(pixels[edge], self.edge_samples, seed)
         return Tile(crop, radiance)
+
+    def _radiance(self, crop: Crop, seed: int) -> Image:
+        """The crop `[h, w, C]` by few samples, and by all of them where few leave too much noise."""
+        few = self.samples <= monte_carlo.PILOT or crop.height == 0 or crop.width == 0
+        if few or not self.noise or not self._lit.tells_noise:
+            return self._lit.render(crop, self.samples, seed)
+        radiance, doubt = monte_carlo.mean_and_doubt(self._lit.halves(crop, monte_carlo.PILOT, ~seed), self.noise)
+        pixels = crop.pixels(self.scene.camera.shape[1])[doubt.ravel()]
+        radiance[doubt] = self._lit.pixels(pixels, self.samples, seed)
+        return radiance
 
     def footprint(self, pose: Pose, spotlight: int) -> Crop:
         """The pixels a spotlight can reach: its cone's outline, moved along the rays by what bumps may add or hide."""

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from conespot.render import globe, kernel, spectral, wavefront
 from conespot.render.reflectance import Reflectance
 from conespot.render.retina_mesh import retina_mesh
+from conespot.render.retina_sphere import on_sphere, retina_sphere
 from conespot.render.tile import Crop
 from conespot.scene import Scene
 from conespot.scene.illumination import Light
@@ -43,38 +44,57 @@ class Stage:
         like: Stage | None = None,
     ) -> None:
         """Load it. `like` is another stage of the same scene, whose retina is shared where the light plays no part."""
-        mi, dr, chosen = kernel.load()
+        mi, _, chosen = kernel.load()
         self._mi, self._vectorized = mi, chosen.vectorized
         self._columns = scene.camera.shape[1]
-        reflectance = Reflectance(scene.retina)
+        self._reflectance = Reflectance(scene.retina)
         channels = spectral.channels(scene, light, responses)
         self.channels = len(channels)
-        apart = reflectance.is_spectral_map and not chosen.vectorized
+        apart = self._reflectance.is_spectral_map and not chosen.vectorized
         # a channel whose filter blocks all of the light stays black; Mitsuba could not sample a wavelength for it
         self._seen = [i for i, channel in enumerate(channels) if channel.film.integral() > 0.0]
+        grey = [channels[i].film.integral() for i in self._seen]
+        self._grey = grey if self._reflectance.is_grey else None
         self._scenes = []
         self.retina: Any = None
+        walls = scene.interreflection if closed else None
+        self.transport: wavefront.Transport = "path" if walls is not None else "direct"
+        if self._vectorized and walls is None and scene.surface.is_sphere and not shapes:
+            self.transport = "unblocked"
         for group in [[channels[i]] for i in self._seen] if apart else [[channels[i] for i in self._seen]]:
             if not group:
                 continue
-            if apart or like is None or like.retina is None:
-                bsdf = mi.load_dict(reflectance.bsdf(mi, dr, group[0].film if apart else None))
-                self.retina = retina_mesh(mi, scene, bsdf)
+            if apart or like is None or like.retina is None or like.transport != self.transport:
+                self.retina = self._retina(scene, group[0].film if apart else None)
             else:
                 self.retina = like.retina
             integrator: dict[str, Any] = {"type": "direct", "emitter_samples": 1, "bsdf_samples": 0}
             everything = {"retina": self.retina, "light": dict(emitter), **shapes}
-            near = scene.camera.height / 1000.0
-            if closed and scene.interreflection is not None:
-                near = globe.near_plane(scene)
-                everything.update(globe.globe_shapes(mi, scene, scene.interreflection))
-                depth = scene.interreflection.bounces + 1
+            if walls is not None:
+                everything.update(globe.globe_shapes(mi, scene, walls))
+                depth = walls.bounces + 1
                 integrator = {"type": "path", "max_depth": depth, "rr_depth": depth}
+            near = scene.camera.height / 1000.0 if self.transport == "direct" else globe.near_plane(scene)
             sensor = _sensor(mi, scene, group, samples, near)
             # without the robust test one ray in a million slips between two triangles and leaves its pixel 6 % dark
             settings = {"type": "scene", "embree_use_robust_intersections": True, "integrator": integrator}
             self._scenes.append(mi.load_dict({**settings, "sensor": sensor, **everything}))
         self._parameters = [mi.traverse(loaded) for loaded in self._scenes]
+
+    @property
+    def tells_noise(self) -> bool:
+        """Whether `halves` tells how noisy a rendering is: light reflected once in a JIT variant."""
+        return self._vectorized and self.transport != "path"
+
+    def _retina(self, scene: Scene, band: Curve | None) -> Any:
+        """The Mitsuba shape: a sphere where it may be one, else a mesh."""
+        mi, dr, _ = kernel.load()
+        texture = self._reflectance.texture(mi, dr, band)
+        if self.transport != "unblocked":
+            return retina_mesh(mi, scene, mi.load_dict(self._reflectance.bsdf(mi, texture)))
+        if not self._reflectance.is_even:
+            texture = on_sphere(mi, dr, texture, scene.eye)
+        return mi.load_dict(retina_sphere(scene.eye, self._reflectance.bsdf(mi, texture)))
 
     def update(self, values: Mapping[str, Any]) -> None:
         """Set parameters of the Mitsuba scene; they take effect with the next rendering."""
@@ -98,17 +118,38 @@ class Stage:
         size = max(1, PASS // samples)
         for first in range(0, len(pixels), size):
             part = pixels[first : first + size]
-            layers = [self._traced(i, part, samples, seed % 2**32) for i in range(len(self._scenes))]
+            layers = [self._traced(i, part, samples, seed) for i in range(len(self._scenes))]
             if layers:
                 values[first : first + size, self._seen] = np.concatenate(layers, axis=-1)
         return values
 
+    def halves(self, crop: Crop, samples: int, seed: int) -> Image:
+        """The crop's radiance by each half of the samples alone `[h, w, 2, C]`, where it `tells_noise`."""
+        image = np.zeros((crop.height, crop.width, 2, self.channels), np.float32)
+        flat, pixels, size = image.reshape(-1, 2, self.channels), crop.pixels(self._columns), PASS // samples
+        for first in range(0, len(pixels) if self._seen else 0, size):
+            part = pixels[first : first + size]
+            flat[first : first + size, :, self._seen] = self._wavefront(part, samples, seed, halves=True)
+        return image
+
+    def _wavefront(self, pixels: NDArray[np.uint32], samples: int, seed: int, halves: bool = False) -> Image:
+        self._parameters[0].update()
+        return wavefront.trace(
+            self._scenes[0],
+            pixels,
+            self._columns,
+            samples,
+            seed % 2**32,
+            transport=self.transport,
+            grey=self._grey,
+            halves=halves,
+        )
+
     def _traced(self, scene: int, pixels: NDArray[np.uint32], samples: int, seed: int) -> Image:
         """What one of the Mitsuba scenes makes of the pixels `[N, channels of it]`."""
-        loaded, parameters = self._scenes[scene], self._parameters[scene]
         if self._vectorized:
-            parameters.update()
-            return wavefront.trace(loaded, pixels, self._columns, samples, seed)
+            return self._wavefront(pixels, samples, seed)
+        loaded, parameters = self._scenes[scene], self._parameters[scene]
         # without a JIT the loop over samples must be Mitsuba's own, which knows rectangles alone
         values: list[Image] = []
         places = []

@@ -2,20 +2,37 @@
 
 from __future__ import annotations
 
-from typing import Any
+from collections.abc import Sequence
+from typing import Any, Literal, assert_never
 
 import numpy as np
 from numpy.typing import NDArray
 
 from conespot.render import kernel
 
+#: how light comes to what the camera sees: from the emitter, which nothing can hide; from the emitter, unless something
+#: does; or by the integrator's paths
+Transport = Literal["unblocked", "direct", "path"]
 
-def trace(loaded: Any, pixels: NDArray[np.uint32], width: int, samples: int, seed: int) -> NDArray[np.float32]:
+
+def trace(
+    loaded: Any,
+    pixels: NDArray[np.uint32],
+    width: int,
+    samples: int,
+    seed: int,
+    *,
+    transport: Transport,
+    grey: Sequence[float] | None = None,
+    halves: bool = False,
+) -> NDArray[np.float32]:
     """What the film's channels see `[N, C]` of the pixels `[N]` (row * width + column) of a Mitsuba scene.
 
     The film must have the frame's first pixel as its crop. Each sample takes a cell of its own of the pixel's area, and
     one of the film's wavelengths; a pixel's depend on `seed` and its place in the frame, not on the other pixels asked
-    for. Where light that is reflected twice goes depends on those too.
+    for. Where light that is reflected twice goes depends on those too. Where all wavelengths are alike, `grey` has the
+    integral of each channel's response. With `halves`, `[N, 2, C]`: of each half of the samples, which lie on the
+    pixel's cells like a chequerboard's two colours.
     """
     mi, dr, _ = kernel.load()
     sensor = loaded.sensors()[0]
@@ -29,17 +46,46 @@ def trace(loaded: Any, pixels: NDArray[np.uint32], width: int, samples: int, see
     state, sequence = mi.sample_tea_32(first + k, second)
     random = mi.PCG32(initstate=mi.UInt64(state), initseq=mi.UInt64(sequence))
     columns = max(d for d in range(1, int(samples**0.5) + 1) if samples % d == 0)
-    x = mi.Float(pixel % width) + (mi.Float(k % columns) + random.next_float32()) / columns
-    y = mi.Float(pixel // width) + (mi.Float(k // columns) + random.next_float32()) * (columns / samples)
+    column, row = k % columns, k // columns
+    if halves:
+        half, place = k // (samples // 2), k % (samples // 2)
+        row = place // (columns // 2)
+        column = 2 * (place % (columns // 2)) + (row + half) % 2
+    x = mi.Float(pixel % width) + (mi.Float(column) + random.next_float32()) / columns
+    y = mi.Float(pixel // width) + (mi.Float(row) + random.next_float32()) * (columns / samples)
     # a ray carries four wavelengths, each a quarter of the range from the next: cells of a quarter tell them all apart.
     # Cells of area and of wavelength are paired at random, or colours would lie across the pixel.
     wavelength = (mi.Float(mi.permute_kensler(k, samples, first)) + random.next_float32()) / (4 * samples)
-    bounces = mi.load_dict({"type": "independent"})
-    bounces.seed(seed, len(pixels) * samples)
     # the sensor takes a place in units of its film's crop, which is one pixel
     ray, weight = sensor.sample_ray_differential(0.0, wavelength, mi.Point2f(x, y), mi.Point2f(0.5))
-    light, met, _ = loaded.integrator().sample(loaded, bounces, ray)
-    values = film.prepare_sample(weight * light, ray.wavelengths, channels, 1.0, 1.0, met)
-    sums = [dr.block_sum(dr.select(met, value, 0.0), samples) for value in values[:-1]]
+    match transport:
+        case "unblocked" | "direct":
+            light, met = _lit(loaded, ray, transport == "direct")
+        case "path":
+            bounces = mi.load_dict({"type": "independent"})
+            bounces.seed(seed, len(pixels) * samples)
+            light, met, _ = loaded.integrator().sample(loaded, bounces, ray)
+        case _:
+            assert_never(transport)
+    if grey is None:
+        values = film.prepare_sample(weight * light, ray.wavelengths, channels, 1.0, 1.0, met)[:-1]
+    else:
+        values = [light[0] * integral for integral in grey]
+    block = samples // 2 if halves else samples
+    sums = [dr.block_sum(dr.select(met, value, 0.0), block) for value in values]
     dr.eval(sums)
-    return np.stack([np.asarray(total) / np.float32(samples) for total in sums], axis=-1, dtype=np.float32)
+    means = np.stack([np.asarray(total) / np.float32(block) for total in sums], axis=-1, dtype=np.float32)
+    return means.reshape(-1, 2, len(values)) if halves else means
+
+
+def _lit(loaded: Any, ray: Any, shadows: bool) -> tuple[Any, Any]:
+    """What the scene's one emitter, a point or a direction, sends back along rays, and which of them meet anything.
+
+    Mitsuba's `direct` integrator does the same, and weighs it against light that BSDF samples would find: here none.
+    """
+    mi, _, _ = kernel.load()
+    at = loaded.ray_intersect(ray, mi.RayFlags.All, True, True)
+    met = at.is_valid()
+    towards, emitted = loaded.sample_emitter_direction(at, mi.Point2f(0.5), shadows, met)
+    reflected = at.bsdf(ray).eval(mi.BSDFContext(), at, at.to_local(towards.d), met)
+    return emitted * reflected, met

@@ -164,10 +164,11 @@ def test_bumps_are_displaced_and_shaded_as_the_closed_form_says():
 
 
 def test_sum_of_tiles_times_power_is_one_render_at_that_power():
-    """z-test per pixel, Sidak-corrected: the tiled frame against brute force with all lights in one scene."""
+    """z-test per pixel, Sidak-corrected: the tiled frame against brute force with all lights in one scene of a mesh."""
     import mitsuba as mi
 
     from conespot.render import emitters
+    from conespot.render.retina_mesh import retina_mesh
 
     scene = scene_of(spotlights=RIGS["triple"], retina=PhotoRetina(), camera=Camera(resolution=300))
     pose = scene.pose(np.array([0.8, 0.4, 4.0]))
@@ -194,11 +195,12 @@ def test_sum_of_tiles_times_power_is_one_render_at_that_power():
             "values": f"{intensity}, {intensity}",
         }
         lights[f"light{k}"] = light
+    look = Reflectance(scene.retina)
     brute_scene = mi.load_dict(
         {
             "type": "scene",
             "integrator": {"type": "path", "max_depth": 2},
-            "retina": renderer._lit.retina,
+            "retina": retina_mesh(mi, scene, mi.load_dict(look.bsdf(mi, look.texture(mi, None)))),
             "sensor": {
                 "type": "perspective",
                 "fov": math.degrees(scene.camera.full_fov),
@@ -302,7 +304,8 @@ def test_the_shaft_hides_the_retina_and_casts_a_shadow():
     # the spot's own light is behind no shaft: the patch is as bright as without
     plain = Renderer(scene_of(ambient=ambient)).tile(pose, 0, seed=2)
     with_shaft = renderer.tile(pose, 0, seed=2)
-    assert with_shaft.radiance.sum() <= plain.radiance.sum()
+    # without a shaft the retina is Mitsuba's sphere and not a mesh: the same to the last bits of float32
+    assert with_shaft.radiance.sum() <= plain.radiance.sum() * (1.0 + 1e-6)
     assert with_shaft.radiance.sum() > 0.3 * plain.radiance.sum()
 
 

@@ -1,0 +1,60 @@
+"""The smooth retina as Mitsuba's sphere: met in closed form, several times faster than a mesh, for JIT variants."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from conespot.render.reflectance import EXTENT
+from conespot.scene import Eye
+
+
+def retina_sphere(eye: Eye, bsdf: Any) -> dict[str, Any]:
+    """The whole sphere, seen from inside: the camera needs a near plane that lets it see past the upper half."""
+    return {
+        "type": "sphere",
+        "center": eye.centre.tolist(),
+        "radius": eye.radius,
+        "flip_normals": True,
+        "bsdf": bsdf,
+    }
+
+
+def on_sphere(mi: Any, dr: Any, texture: Any, eye: Eye) -> Any:
+    """A texture over arc coordinates (see reflectance.py) for the eye's sphere, whose own coordinates are polar."""
+    centre = eye.centre.tolist()
+    inner = mi.load_dict(texture) if isinstance(texture, dict) else texture
+
+    class OnSphere(mi.Texture):  # type: ignore[misc]
+        """The inner texture at the arc coordinates of the place on the sphere."""
+
+        def __init__(self, properties: Any) -> None:
+            super().__init__(properties)
+            self.inner = inner
+
+        def eval(self, si: Any, active: Any = True) -> Any:
+            """Reflectance at the four wavelengths of `si`."""
+            direction = (si.p - mi.Point3f(centre)) / eye.radius
+            rho = dr.sqrt(dr.square(direction.x) + dr.square(direction.y))
+            # the angle from the pole over its sine, 1 to the last bit where both vanish
+            stretch = dr.select(rho > 1e-4, dr.atan2(rho, -direction.z) / rho, 1.0) * (eye.radius / (2.0 * EXTENT))
+            there = mi.SurfaceInteraction3f(si)
+            there.uv = mi.Point2f(0.5 + stretch * direction.x, 0.5 - stretch * direction.y)
+            return self.inner.eval(there, active)
+
+        def mean(self) -> Any:
+            """The inner texture's; Mitsuba only weighs lobes with it."""
+            return self.inner.mean()
+
+        def max(self) -> float:
+            """Bound of the reflectance."""
+            return float(self.inner.max())
+
+        def is_spatially_varying(self) -> bool:
+            """It is."""
+            return True
+
+        def to_string(self) -> str:
+            """For Mitsuba's printing of scenes."""
+            return f"OnSphere[{self.inner}]"
+
+    return OnSphere(mi.Properties())
