@@ -163,7 +163,7 @@ def _run(options: argparse.Namespace) -> Ending:
     from conespot.campaigns.pool import LocalPool
     from conespot.campaigns.session import carry_out
 
-    session = carry_out(document, Path(options.out) if options.out else None, LocalPool(options.workers))
+    session = carry_out(document, options.out, LocalPool(options.workers))
     _say_results(session.folder)
     return _complain(session.sentence, Ending.FAILED) if session.lost else Ending.DONE
 

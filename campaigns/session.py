@@ -36,7 +36,7 @@ class Session:
 
 def run_campaign(
     campaign: str | Path,
-    out: Path | None = None,
+    out: str | Path | None = None,
     *,
     workers: int = 1,
     settings: Mapping[str, str] | None = None,
@@ -60,7 +60,7 @@ def run_campaign(
     return session.folder
 
 
-def carry_out(document: Document, out: Path | None, executor: Executor) -> Session:
+def carry_out(document: Document, out: str | Path | None, executor: Executor) -> Session:
     """Do what is left of a campaign and write what its folder holds: rows, theory, tables, figures, report.
 
     Raises as `run_campaign` does, but for poses that were lost.
@@ -68,7 +68,7 @@ def carry_out(document: Document, out: Path | None, executor: Executor) -> Sessi
     from conespot.results import write_results
 
     plan = make_plan(document)
-    folder = out or Path("runs") / plan.campaign.name
+    folder = Path(out or Path("runs") / plan.campaign.name)
     with open_store(folder, plan, document) as store:
         if plan.cases:
             _measure(plan, store, executor)

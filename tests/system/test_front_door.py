@@ -47,6 +47,7 @@ def test_a_scene_is_loaded_and_a_frame_located_as_the_readme_says():
 
 def test_a_campaign_is_run_and_read_from_python(tmp_path):
     settings = {"poses": "1", "scene.camera.resolution": "100", "samples": "1", "sweep": "{}", "localizers": "[paper]"}
-    folder = conespot.run_campaign("power_sweep", tmp_path / "run", settings=settings)
+    folder = conespot.run_campaign("power_sweep", str(tmp_path / "run"), settings=settings)
     assert folder == tmp_path / "run"
-    assert len(conespot.load_run(folder).rows) == 1
+    for where in (folder, str(folder)):
+        assert len(conespot.load_run(where).rows) == 1
