@@ -29,22 +29,29 @@ from conespot.scene.scene import Scene
 
 Array = NDArray[np.float64]
 NAMES = (*FREE, "rcm_x", "rcm_y", "rcm_z")
-_OBSERVABLE = 3.0
-_ROUNDS = 3
+_UNITS = {"half_angle": (180.0 / np.pi, " deg"), "softness": (1.0, "")}
 #: sigma of what a scene does not have
 _FIXED = 1e-9
-_UNITS = {"half_angle": (180.0 / np.pi, " deg"), "softness": (1.0, "")}
-#: information below this share of the prior's is none: rounding pulls where a frame says nothing, as of the whole size
-_LEAST = 1e-2
-_OUTLIER = 30.0
-#: how a single frame's fit is held to the common values: it only has to be well conditioned
-_TIGHT = Knowns(
-    rcm_sigma_mm=0.02,
-    half_angle_sigma_deg=0.003,
-    softness_sigma=0.01,
-    eye_radius_sigma_mm=0.01,
-    camera_height_sigma_mm=0.03,
-)
+
+
+@dataclass(frozen=True)
+class CalibrationSettings:
+    """Tuned numbers of the calibration."""
+
+    observable: float = 3.0
+    rounds: int = 3
+    least: float = 1e-2
+    outlier: float = 30.0
+    tight: Knowns = Knowns(  # noqa: RUF009  frozen
+        rcm_sigma_mm=0.02,
+        half_angle_sigma_deg=0.003,
+        softness_sigma=0.01,
+        eye_radius_sigma_mm=0.01,
+        camera_height_sigma_mm=0.03,
+    )
+
+
+CALIBRATION = CalibrationSettings()
 
 
 @dataclass(frozen=True)
@@ -113,10 +120,10 @@ def calibrate(
     nominal = _values(scene)
     widths = width.sigmas(scene)
     prior = 1.0 / np.square(widths)
-    tight = replace(_TIGHT, softness_sigma=_TIGHT.softness_sigma if _has_softness(scene) else 0.0)
+    tight = replace(CALIBRATION.tight, softness_sigma=CALIBRATION.tight.softness_sigma if _has_softness(scene) else 0.0)
     now, found, used = scene, nominal, 0
     covariance = np.diag(1.0 / prior)
-    for _ in range(_ROUNDS):
+    for _ in range(CALIBRATION.rounds):
         here = _values(now)
         terms = []
         for image in frames():
@@ -131,13 +138,15 @@ def calibrate(
             raise InputError("calibration needs at least three frames in which the patch can be measured")
         # a frame that a vessel or a glint misled pulls the others: its step is the longest
         pulls = np.array([float(g @ np.linalg.solve(i + np.diag(prior), g)) for i, g in terms])
-        terms = [t for t, pull in zip(terms, pulls, strict=True) if pull <= _OUTLIER * np.median(pulls) + 1e-9]
+        terms = [
+            t for t, pull in zip(terms, pulls, strict=True) if pull <= CALIBRATION.outlier * np.median(pulls) + 1e-9
+        ]
         step, _ = _combined(terms, prior, nominal - here, 1.0)
         step, covariance = _combined(terms, prior, nominal - here, _disagreement(terms, step, widths))
         found, used = here + step, len(terms)
         now = _with_values(scene, found, [True] * len(NAMES))
     ratio = widths / np.sqrt(np.diag(covariance))
-    observable = {name: bool(r >= _OBSERVABLE) for name, r in zip(NAMES, ratio, strict=True)}
+    observable = {name: bool(r >= CALIBRATION.observable) for name, r in zip(NAMES, ratio, strict=True)}
     return Calibration(found, covariance, observable, used)
 
 
@@ -174,8 +183,8 @@ def _combined(terms: list[tuple[Array, Array]], prior: Array, off: Array, inflat
 def _seen(information: Array, pull: Array, widths: Array) -> tuple[Array, Array]:
     """A frame's information and pull without the directions it says next to nothing about."""
     sizes, axes = np.linalg.eigh(information * np.outer(widths, widths))
-    kept = axes[:, sizes > _LEAST]
-    part = (kept * sizes[sizes > _LEAST]) @ kept.T
+    kept = axes[:, sizes > CALIBRATION.least]
+    part = (kept * sizes[sizes > CALIBRATION.least]) @ kept.T
     return part / np.outer(widths, widths), kept @ (kept.T @ (pull * widths)) / widths
 
 
@@ -187,7 +196,7 @@ def _disagreement(terms: list[tuple[Array, Array]], step: Array, widths: Array) 
     total, told = 0.0, 0
     for information, pull in terms:
         sizes, axes = np.linalg.eigh(information * np.outer(widths, widths))
-        seen = sizes > _LEAST / 2.0
+        seen = sizes > CALIBRATION.least / 2.0
         off = (axes.T @ ((pull - information @ step) * widths))[seen]
         total += float(np.sum(np.square(off) / sizes[seen]))
         told += int(np.count_nonzero(seen))

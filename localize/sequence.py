@@ -23,7 +23,18 @@ from conespot.scene.document import InputError
 from conespot.scene.scene import Scene
 
 Array = NDArray[np.float64]
-_MARGIN = 0.25  # of a patch's size, kept out around it: a start is good to a twentieth
+
+
+@dataclass(frozen=True)
+class SequenceSettings:
+    """Tuned numbers of learning the ambient view."""
+
+    margin: float = 0.25
+    margin_px: float = 3.0
+    fewest: int = 2
+
+
+SEQUENCE = SequenceSettings()
 
 
 class AmbientMap:
@@ -57,7 +68,7 @@ class AmbientMap:
                 self._white = float(white_level(image, self._scene))
         elif self._sum.shape != image.shape:
             raise InputError(f"sequence: a frame of shape {image.shape} after frames of {self._sum.shape}")
-        margin = _MARGIN * float(np.max(np.ptp(points, axis=0))) + 3.0
+        margin = SEQUENCE.margin * float(np.max(np.ptp(points, axis=0))) + SEQUENCE.margin_px
         low = np.floor(points.min(axis=0) - margin).astype(int).clip(0)
         high = np.ceil(points.max(axis=0) + margin).astype(int)
         hidden = (slice(low[1], high[1]), slice(low[0], high[0]))
@@ -79,7 +90,7 @@ class AmbientMap:
 
         Pixels that no frame shows unlit get the median of the others. None if fewer than two frames were added.
         """
-        if self._sum is None or len(self._added) < 2:
+        if self._sum is None or len(self._added) < SEQUENCE.fewest:
             return None
         seen = self._levels > 0.0
         mean = float(np.mean(self._added))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,14 +18,22 @@ MISFIT = "the light in the patch contradicts the model of the beam"
 OUTSIDE = "the fitted tip is outside the eye"
 BEHIND = "the fitted tip is behind the remote centre of motion"
 UNSETTLED = "the fit does not settle"
-#: largest sigma of the tip that is returned [mm]; a free fit may run off along what it hardly sees, a tied one cannot
-LARGEST_SIGMA_MM = 0.15
-LARGEST_FREE_SIGMA_MM = 0.06
-_LARGEST_MISFIT = 2.5
-_LEAST_COVERED = 0.35
-_MISS_SIGMAS = 5.0
-#: what no fit on real optics resolves, added to every tip and axis
-_FLOOR_MM, _FLOOR_RAD = 2e-5, 2e-6
+
+
+@dataclass(frozen=True)
+class VerdictSettings:
+    """Tuned numbers of the verdict."""
+
+    largest_sigma_mm: float = 0.15
+    largest_free_sigma_mm: float = 0.06
+    largest_misfit: float = 2.5
+    least_covered: float = 0.35
+    miss_sigmas: float = 5.0
+    floor_mm: float = 2e-5
+    floor_rad: float = 2e-6
+
+
+VERDICT = VerdictSettings()
 
 
 def judged(
@@ -42,7 +51,7 @@ def judged(
     `covariance` `[P, P]` is of the pose and the free quantities, infinite if there is none. `misfit` is the rms
     residual over the model's, `covered` the share seen.
     """
-    if covered < _LEAST_COVERED:
+    if covered < VERDICT.least_covered:
         return LocalizationFailure(COVERED)
     if nominal.depth(estimate.pose.apex) <= 0.0:
         return LocalizationFailure(OUTSIDE)
@@ -51,18 +60,18 @@ def judged(
         return LocalizationFailure(BEHIND)
     size = estimate.pose_size
     pose = covariance[:size, :size].copy()
-    pose[np.arange(3), np.arange(3)] += _FLOOR_MM**2
-    pose[np.arange(3, size), np.arange(3, size)] += _FLOOR_RAD**2
+    pose[np.arange(3), np.arange(3)] += VERDICT.floor_mm**2
+    pose[np.arange(3, size), np.arange(3, size)] += VERDICT.floor_rad**2
     sigma = math.sqrt(float(np.trace(pose[:3, :3])))
-    limit = LARGEST_FREE_SIGMA_MM if knowns.rcm_sigma_mm is None else LARGEST_SIGMA_MM
+    limit = VERDICT.largest_free_sigma_mm if knowns.rcm_sigma_mm is None else VERDICT.largest_sigma_mm
     if not math.isfinite(sigma) or sigma > limit:
         return LocalizationFailure(UNCERTAIN)
     if knowns.rcm_sigma_mm is not None:
         reach = float(np.linalg.norm(np.asarray(nominal.instrument.rcm) - estimate.pose.apex))
         spread = math.hypot(knowns.rcm_sigma_mm, reach * math.sqrt(float(np.max(np.diag(pose)[3:5]))))
-        if float(np.linalg.norm(rcm_miss(estimate.pose, nominal))) > _MISS_SIGMAS * spread + 1e-5:
+        if float(np.linalg.norm(rcm_miss(estimate.pose, nominal))) > VERDICT.miss_sigmas * spread + 1e-5:
             return LocalizationFailure(MISSES_RCM)
-    if misfit > _LARGEST_MISFIT:
+    if misfit > VERDICT.largest_misfit:
         return LocalizationFailure(MISFIT)
     if not settled:
         return LocalizationFailure(UNSETTLED)

@@ -23,7 +23,7 @@ INNER_ROOMS = {
     "published": set(),
     "model": set(),
     "start": {"model"},
-    "edge": {"model", "start"},
+    "edge": {"model"},
     "field": {"model"},
     "theory": {"model"},
 }

@@ -10,12 +10,11 @@ from conespot.localize.model.solve import inverse
 from conespot.localize.outcome import COVERED, UNCERTAIN, Localization
 from conespot.localize.verdict import (
     BEHIND,
-    LARGEST_FREE_SIGMA_MM,
-    LARGEST_SIGMA_MM,
     MISFIT,
     MISSES_RCM,
     OUTSIDE,
     UNSETTLED,
+    VERDICT,
     judged,
 )
 from conespot.scene import Pose
@@ -98,6 +97,6 @@ def test_a_missed_rcm_is_no_contradiction_where_it_is_not_known_or_not_known_tha
 
 
 def test_a_free_fit_may_be_less_uncertain_before_it_is_refused():
-    between = np.full(5, 0.5 * (LARGEST_FREE_SIGMA_MM + LARGEST_SIGMA_MM) / math.sqrt(3.0))
+    between = np.full(5, 0.5 * (VERDICT.largest_free_sigma_mm + VERDICT.largest_sigma_mm) / math.sqrt(3.0))
     assert verdict(sigmas=between)
     assert verdict(sigmas=between, knowns=Knowns(rcm_sigma_mm=None)).reason == UNCERTAIN
