@@ -72,7 +72,11 @@ class HardBeam(Model):
 
     @property
     def flux_factor(self) -> float:
-        """2 pi (1 - cos b) [sr]."""
+        """2 pi (1 - cos b) [sr].
+
+        >>> round(HardBeam(half_angle=math.radians(9.0)).flux_factor, 6)
+        0.077356
+        """
         return 2.0 * math.pi * (1.0 - math.cos(self.half_angle))
 
 
@@ -84,7 +88,12 @@ class CyclesBeam(Model):
     blend: float = Field(1.0, gt=0.0, le=1.0)
 
     def intensity(self, cos_angle: ArrayLike) -> Array:
-        """Relative radiant intensity at cosines of the angle off the axis, any shape."""
+        """Relative radiant intensity at cosines of the angle off the axis, any shape.
+
+        >>> b = math.radians(9.0)
+        >>> CyclesBeam(half_angle=b).intensity([1.0, (1.0 + math.cos(b)) / 2.0, math.cos(b)]).round(9).tolist()
+        [1.0, 0.5, 0.0]
+        """
         cos_b = math.cos(self.half_angle)
         u = np.clip((np.asarray(cos_angle, float) - cos_b) / (self.blend * (1.0 - cos_b)), 0.0, 1.0)
         return u * u * (3.0 - 2.0 * u)
@@ -106,7 +115,11 @@ class CyclesBeam(Model):
 
     @property
     def flux_factor(self) -> float:
-        """2 pi (1 - cos b) (1 - blend / 2) [sr]: the smoothstep's mean over its ramp is one half."""
+        """2 pi (1 - cos b) (1 - blend / 2) [sr]: the smoothstep's mean over its ramp is one half.
+
+        >>> CyclesBeam().flux_factor == HardBeam().flux_factor / 2.0
+        True
+        """
         return 2.0 * math.pi * (1.0 - math.cos(self.half_angle)) * (1.0 - self.blend / 2.0)
 
 
@@ -124,7 +137,11 @@ class LinearBeam(Model):
         return self
 
     def intensity(self, cos_angle: ArrayLike) -> Array:
-        """Relative radiant intensity at cosines of the angle off the axis, any shape."""
+        """Relative radiant intensity at cosines of the angle off the axis, any shape.
+
+        >>> LinearBeam(half_angle=0.2, beam_width=0.1).intensity(np.cos([0.05, 0.15, 0.25])).round(9).tolist()
+        [1.0, 0.5, 0.0]
+        """
         angle = np.arccos(np.clip(np.asarray(cos_angle, float), -1.0, 1.0))
         return np.clip((self.half_angle - angle) / (self.half_angle - self.beam_width), 0.0, 1.0)
 

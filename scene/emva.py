@@ -158,7 +158,12 @@ class Emva(Model):
 
     @property
     def electrons_per_signal(self) -> float:
-        """Electrons in a pixel per response-weighted radiance of 1 A m-2 sr-1."""
+        """Electrons in a pixel per response-weighted radiance of 1 A m-2 sr-1.
+
+        >>> camera = Emva(exposure_time=1e-3, f_number=2.0, lens_transmission=1.0, pixel_pitch=4e-3)
+        >>> round(camera.electrons_per_signal * ELEMENTARY_CHARGE / (16e-12 * 1e-3 * math.pi / 16.0), 12)
+        1.0
+        """
         etendue = (self.pixel_pitch * 1e-3) ** 2 * math.pi * self.lens_transmission / (4.0 * self.f_number**2)
         return etendue * self.exposure_time / ELEMENTARY_CHARGE
 

@@ -69,13 +69,22 @@ def hazard_fractions(spectrum: Curve) -> tuple[float, float]:
 
 
 def exposure(irradiance: float, spectrum: Curve) -> RetinalExposure:
-    """The exposure of an irradiance [W/m2] of a light of this spectrum."""
+    """The exposure of an irradiance [W/m2] of a light of this spectrum.
+
+    >>> from conespot.scene.illumination import Line
+    >>> exposure(1000.0, Line(wavelength=850.0).spectrum).seconds_to_guide  # no photochemical hazard in the infrared
+    inf
+    """
     photochemical, thermal = hazard_fractions(spectrum)
     return RetinalExposure(irradiance, irradiance * photochemical, irradiance * thermal)
 
 
 def disc_irradiance(flux: float, half_angle: float, distance: float) -> float:
-    """Mean irradiance [W/m2] of a flux [W] on the disc a cone cuts from a plane `distance` [mm] away, across it."""
+    """Mean irradiance [W/m2] of a flux [W] on the disc a cone cuts from a plane `distance` [mm] away, across it.
+
+    >>> round(disc_irradiance(1e-3, math.atan(0.5), 2.0), 3)  # 1 mW over a radius of 1 mm
+    318.31
+    """
     radius = distance * 1e-3 * math.tan(half_angle)
     return flux / (math.pi * radius * radius)
 

@@ -27,6 +27,9 @@ class Eye(Model):
 
         The larger root of |o + t d - c|^2 = r^2: for a ray from inside the eye the wall in front of it, for one
         from the camera the retina at the bottom.
+
+        >>> Eye(radius=12.0).intersect([0.0, 0.0, 110.0], [[0.0, 0.0, -1.0], [1.0, 0.0, 0.0]]).tolist()
+        [110.0, nan]
         """
         o = np.asarray(origin, float) - self.centre
         d = np.asarray(direction, float)
@@ -36,13 +39,21 @@ class Eye(Model):
         return -b + np.sqrt(np.where(disc >= 0.0, disc, np.nan))
 
     def height(self, x: ArrayLike, y: ArrayLike) -> NDArray[np.float64]:
-        """z [mm] of the lower wall above (x, y) [mm]; NaN outside the eye's shadow."""
+        """z [mm] of the lower wall above (x, y) [mm]; NaN outside the eye's shadow.
+
+        >>> Eye(radius=12.0).height([0.0, 12.0, 13.0], 0.0).tolist()
+        [0.0, 12.0, nan]
+        """
         rho2 = np.square(np.asarray(x, float)) + np.square(np.asarray(y, float))
         inside = np.where(rho2 <= self.radius**2, self.radius**2 - rho2, np.nan)
         return self.radius - np.sqrt(inside)
 
     def arc(self, directions: ArrayLike) -> NDArray[np.float64]:
-        """Arc coordinates `[..., 2]` [mm] of directions `[..., 3]` from the centre: azimuthal equidistant."""
+        """Arc coordinates `[..., 2]` [mm] of directions `[..., 3]` from the centre: azimuthal equidistant.
+
+        >>> (Eye(radius=12.0).arc([1.0, 0.0, 0.0]) / 12.0).round(6).tolist()  # a quarter of a turn from the pole
+        [1.570796, 0.0]
+        """
         d = np.asarray(directions, float)
         rho = np.hypot(d[..., 0], d[..., 1])
         along = self.radius * np.arctan2(rho, -d[..., 2])

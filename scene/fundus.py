@@ -77,7 +77,11 @@ def melanin_template(wavelength: ArrayLike) -> Array:
 
 
 def reflectance(wavelength: ArrayLike, pigments: Pigments) -> Array:
-    """Reflectance R in the retinal plane at wavelengths [nm], any shape."""
+    """Reflectance R in the retinal plane at wavelengths [nm], any shape.
+
+    >>> reflectance([500.0, 650.0, 850.0], SITES["perifovea"]).round(3).tolist()
+    [0.018, 0.068, 0.125]
+    """
     l = np.asarray(wavelength, float)  # noqa: E741 - the formula's own letter
     choroid = scatter(l) * np.exp(-2.0 * blood_absorption(l, CHOROID_SATURATION) * pigments.blood)
     behind = (1.0 - pigments.epithelium) ** 2 * 10.0 ** (-2.0 * pigments.melanin * melanin_template(l)) * choroid
@@ -126,7 +130,11 @@ def water_transmission(wavelength: ArrayLike, length: float = VITREOUS_LENGTH) -
 
 
 def macular_profile(eccentricity_deg: ArrayLike) -> Array:
-    """Macular pigment relative to its centre: 3.6028 / (e^2 + 3.6028) (Putnam & Bland 2014)."""
+    """Macular pigment relative to its centre: 3.6028 / (e^2 + 3.6028) (Putnam & Bland 2014).
+
+    >>> macular_profile([0.0, 3.6028**0.5]).tolist()
+    [1.0, 0.5]
+    """
     squared = np.square(np.asarray(eccentricity_deg, float))
     return np.asarray(3.6028 / (squared + 3.6028))
 

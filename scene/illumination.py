@@ -95,7 +95,12 @@ class Line(Model):
 
     @property
     def spectrum(self) -> Curve:
-        """Spectral density with integral 1 [1/nm]."""
+        """Spectral density with integral 1 [1/nm].
+
+        >>> spectrum = Line(wavelength=532.0, width=2.0).spectrum
+        >>> spectrum([530.0, 531.0, 532.0]).tolist(), spectrum.integral()
+        ([0.0, 0.25, 0.5], 1.0)
+        """
         x = self.wavelength + self.width * np.array([-1.0, 0.0, 1.0])
         return Curve(x, np.array([0.0, 1.0, 0.0]) / self.width)
 

@@ -41,6 +41,10 @@ class Pose:
     def through(cls, apex: ArrayLike, rcm: ArrayLike) -> Pose:
         """The pose with its tip at `apex` `[3]` whose axis comes from the remote centre of motion `rcm` `[3]` [mm].
 
+        >>> pose = Pose.through([0.0, 0.0, 4.0], [0.0, 3.0, 8.0])
+        >>> pose.axis.tolist(), round(math.degrees(pose.azimuth), 6), round(math.degrees(pose.tilt), 6)
+        ([0.0, -0.6, -0.8], 90.0, 36.869898)
+
         Raises ValueError if the two coincide.
         """
         tip, centre = np.asarray(apex, float), np.asarray(rcm, float)
@@ -81,7 +85,7 @@ def tangents(axis: Array) -> tuple[Array, Array]:
 def cone_rays(axis: Array, half_angle: ArrayLike, azimuth: ArrayLike) -> Array:
     """Unit directions `[..., 3]` at angles `half_angle` off the unit `axis` `[3]` and `azimuth` from U to V [rad].
 
-    >>> cone_rays(np.array([0.0, 0.0, -1.0]), math.pi / 2.0, [0.0, math.pi / 2.0]).round(12).tolist()
+    >>> (cone_rays(np.array([0.0, 0.0, -1.0]), math.pi / 2.0, [0.0, math.pi / 2.0]).round(12) + 0.0).tolist()
     [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0]]
     """
     u, v = tangents(axis)

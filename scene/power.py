@@ -32,6 +32,14 @@ class Power(Model):
 
     `isotropic` is Blender's: the on-axis radiant intensity is P / 4 pi whatever the cone, so the flux that leaves
     the tip is far below P. `flux` is the radiant flux that leaves the tip.
+
+    >>> from conespot.scene.beam import CyclesBeam, HardBeam
+    >>> round(Power(value=1.0).axial_intensity(CyclesBeam()), 6) == round(1.0 / (4.0 * math.pi), 6)
+    True
+    >>> round(1e3 * Power(value=1.0).flux(CyclesBeam()), 3)  # of 1 W only so many mW leave the tip
+    3.078
+    >>> Power(value=2.0, convention="flux").flux(HardBeam())
+    2.0
     """
 
     value: Watts = Field(1.0, ge=0.0)

@@ -43,6 +43,9 @@ _QUANTITY = re.compile(r"\s*([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)\s*([A-Za
 def parse_quantity(value: object, kind: str, *, bare: bool = True) -> float:
     """The value in the unit held inside for `kind`.
 
+    >>> parse_quantity("0.5 mW", "power"), round(parse_quantity("180 deg", "angle"), 6)
+    (0.0005, 3.141593)
+
     Raises ValueError, in a sentence that says how to write it, for a wrong or missing unit, a bare number where
     `bare` is False, and anything that is not finite.
     """

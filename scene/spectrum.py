@@ -18,7 +18,14 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True, eq=False)
 class Curve:
-    """A quantity over wavelength: linear between `wavelengths` `[N]` [nm], which increase, and 0 outside them."""
+    """A quantity over wavelength: linear between `wavelengths` `[N]` [nm], which increase, and 0 outside them.
+
+    >>> triangle = Curve(np.array([500.0, 550.0, 600.0]), np.array([0.0, 2.0, 0.0]))
+    >>> triangle([500.0, 525.0, 700.0]).tolist()
+    [0.0, 1.0, 0.0]
+    >>> triangle.integral(), triangle.integral(low=550.0), round(triangle.mean_wavelength, 6)
+    (100.0, 50.0, 550.0)
+    """
 
     wavelengths: Array
     values: Array
@@ -91,7 +98,12 @@ class Curve:
 
 
 def mean_of(light: Curve, quantity: Curve) -> float:
-    """Mean of a quantity weighted by a light's spectrum, 0 where the quantity is not tabulated."""
+    """Mean of a quantity weighted by a light's spectrum, 0 where the quantity is not tabulated.
+
+    >>> flat, ramp = (Curve(np.array([500.0, 600.0]), np.array(ends)) for ends in ([1.0, 1.0], [0.0, 1.0]))
+    >>> round(mean_of(flat, ramp), 9)
+    0.5
+    """
     return light.times(quantity).integral() / light.integral()
 
 

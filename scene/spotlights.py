@@ -38,7 +38,12 @@ def rig_name(spotlights: tuple[Spotlight, ...]) -> str:
 
 
 def spotlight_axes(pose: Pose, spotlights: tuple[Spotlight, ...]) -> NDArray[np.float64]:
-    """Unit axes of the cones `[K, 3]`: Rz(azimuth) Ry(tilt) Rz(roll) Ry(y_k) Rx(x_k) (0, 0, -1)."""
+    """Unit axes of the cones `[K, 3]`: Rz(azimuth) Ry(tilt) Rz(roll) Ry(y_k) Rx(x_k) (0, 0, -1).
+
+    >>> straight = Pose(np.zeros(3), np.array([0.0, 0.0, -1.0]))
+    >>> (spotlight_axes(straight, (Spotlight(), Spotlight(x=math.pi / 2.0))).round(12) + 0.0).tolist()
+    [[0.0, 0.0, -1.0], [0.0, 1.0, 0.0]]
+    """
     down = np.array([0.0, 0.0, -1.0])
     return np.stack([pose.rotation() @ rot_y(s.y) @ rot_x(s.x) @ down for s in spotlights])
 

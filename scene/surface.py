@@ -29,6 +29,10 @@ class Bump(Model):
 
     rho is the distance along the sphere from the bump's centre. The paper (4.2) states diameter and height only;
     the raised cosine has no kink at its foot.
+
+    >>> eye, surface = Eye(), Surface(bumps=(Bump(x=0.0, y=0.0, height=0.1),))
+    >>> surface.points(eye, [0.0, 0.0, -1.0]).round(9).tolist()
+    [0.0, 0.0, 0.1]
     """
 
     x: Length

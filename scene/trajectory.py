@@ -35,7 +35,11 @@ class Box(Model):
 
 
 class Helix(Model):
-    """x = R sin(phi), y = R cos(phi), z = z0 + pitch phi, phi over `turns` turns, both ends included (4.1)."""
+    """x = R sin(phi), y = R cos(phi), z = z0 + pitch phi, phi over `turns` turns, both ends included (4.1).
+
+    >>> Helix(turns=0.25).positions(2, np.random.default_rng(0)).round(3).tolist()
+    [[0.0, 2.0, 2.0], [2.0, 0.0, 2.393]]
+    """
 
     kind: Literal["helix"] = "helix"
     radius: Length = Field(2.0, gt=0.0)
