@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import math
 from pathlib import Path
 from typing import Any
@@ -99,12 +100,19 @@ def expand(document: Document, at: tuple[str | int, ...]) -> Document:
         return document
     name = str(data["preset"])
     beside = document.folder / name
-    preset = read_document(beside if beside.is_file() else find_document(name, "scene", "presets", "scene preset"))
+    path = beside if beside.is_file() else find_document(name, "scene", "presets", "scene preset")
+    preset = _read_preset(path, path.stat().st_mtime_ns)
     full = merge(preset.data, {k: v for k, v in data.items() if k != "preset"})
     for key in reversed(at):
         full = {str(key): full}
     lines = {**{(*at, *k): v for k, v in preset.lines.items() if k}, **document.lines}
     return Document(document.source, merge_at(document.data, full, at), lines, document.folder)
+
+
+@functools.lru_cache(maxsize=16)
+def _read_preset(path: Path, changed: int) -> Document:
+    """The document as it was at that time; a sweep lays each of its combinations on the same one."""
+    return read_document(path)
 
 
 def merge_at(data: dict[str, Any], new: dict[str, Any], at: tuple[str | int, ...]) -> dict[str, Any]:
