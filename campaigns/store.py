@@ -17,7 +17,7 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import IO
 
-from conespot.campaigns.description import description_lines
+from conespot.campaigns.cases import write_cases
 from conespot.campaigns.ending import RunError, held_back
 from conespot.campaigns.plan import Plan
 from conespot.campaigns.row import Record, rows
@@ -117,7 +117,7 @@ def open_store(folder: Path, plan: Plan, document: Document) -> Iterator[Store]:
         if begun_with.get("identity") != plan.identity:
             raise InputError(f"{folder}: holds the run of another campaign or other settings; choose another --out")
         if plan.cases:
-            write_atomically(folder / "cases.jsonl", description_lines(plan))
+            write_cases(folder, plan)
         yield Store(folder, plan, journal, begun_with)
 
 

@@ -11,7 +11,7 @@ from pathlib import Path
 import pandas as pd
 import pytest
 
-from conespot.campaigns.description import description_lines
+from conespot.campaigns.cases import write_cases
 from conespot.campaigns.plan import make_plan
 from conespot.campaigns.row import Finding, Record, rows
 from conespot.campaigns.schema import makes_frames, override, read_campaign, resolved
@@ -57,7 +57,7 @@ def written(request, tmp_path_factory):
     plan = make_plan(document)
     records = {group.unit(0): answered(group, 0) for group in plan.groups}
     (folder / "campaign.yaml").write_text(dump(resolved(document, {})))
-    (folder / "cases.jsonl").write_bytes(description_lines(plan))
+    write_cases(folder, plan)
     pd.DataFrame(list(rows(plan, records))).to_parquet(folder / "errors.parquet", index=False)
     run = load_run(folder)
     return plan, run, box_table(run.rows)

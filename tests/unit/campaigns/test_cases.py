@@ -1,13 +1,14 @@
-"""campaigns.description: a run says what its cases are, wherever and how often it is read."""
+"""campaigns.cases: a run says what its cases are, wherever and how often it is read."""
 
 import json
 
 import pytest
 
-from conespot.campaigns.description import description_lines
+from conespot.campaigns.cases import write_cases
 from conespot.campaigns.plan import make_plan
 from conespot.campaigns.schema import read_campaign, resolved
 from conespot.campaigns.store import open_store
+from conespot.results.cases import read_cases
 from conespot.scene.document import dump, shipped
 
 BEAMS = """\
@@ -29,11 +30,17 @@ def document(tmp_path):
     return write
 
 
-def said(document):
-    return [json.loads(line) for line in description_lines(make_plan(document)).splitlines()]
+def written(document, folder):
+    write_cases(folder, make_plan(document))
+    return (folder / "cases.jsonl").read_bytes()
 
 
-def test_every_case_of_a_sweep_over_whole_beams_and_powers_states_its_own(document):
+@pytest.fixture
+def said(tmp_path):
+    return lambda document: [json.loads(line) for line in written(document, tmp_path).splitlines()]
+
+
+def test_every_case_of_a_sweep_over_whole_beams_and_powers_states_its_own(document, said):
     cases = said(document(BEAMS))
     assert [case["assumes"]["edge"] for case in cases] == 2 * ["hard, half angle 8 deg"] + 2 * [
         "linear from 5 deg, half angle 9 deg"
@@ -44,7 +51,7 @@ def test_every_case_of_a_sweep_over_whole_beams_and_powers_states_its_own(docume
     assert [case["watts"]["isotropic_w"] for case in cases[::2]] == pytest.approx([1.0] * 2)
 
 
-def test_a_case_states_labels_localizers_and_what_they_are_told(document):
+def test_a_case_states_labels_localizers_and_what_they_are_told(document, said):
     plan = make_plan(document(BEAMS))
     case = said(document(BEAMS))[1]
     assert (case["key"], case["frame"]) == (plan.cases[1].key, plan.cases[1].frame)
@@ -68,12 +75,12 @@ def test_a_case_states_labels_localizers_and_what_they_are_told(document):
         ("sensor", "{kind: linear, white: 2 W/m2/sr, bits: 10}", "linear, 10 bit, white 2 W/m2/sr"),
     ],
 )
-def test_surface_and_sensor_are_described_and_not_only_named(document, key, item, words):
+def test_surface_and_sensor_are_described_and_not_only_named(document, key, item, words, said):
     assumes = said(document(f"scene: paper\nposes: 2\nsweep: {{scene.{key}: [{item}]}}\n"))[0]["assumes"]
     assert words in assumes.values()
 
 
-def test_points_of_a_file_stand_as_its_name_and_a_digest(document, tmp_path):
+def test_points_of_a_file_stand_as_its_name_and_a_digest(document, tmp_path, said):
     (tmp_path / "tips.csv").write_text("x_mm,y_mm,z_mm\n0,0,3\n1,0,4\n")
     trajectory = said(document("scene: paper\nposes: 2\ntrajectory: {kind: csv, file: tips.csv}\n"))[0]["trajectory"]
     assert trajectory["file"] == "tips.csv"
@@ -82,11 +89,16 @@ def test_points_of_a_file_stand_as_its_name_and_a_digest(document, tmp_path):
 
 
 @pytest.mark.parametrize("name", sorted(shipped("campaigns", "")))
-def test_a_resolved_campaign_is_described_as_the_one_it_came_from(tmp_path, name):
+def test_a_resolved_campaign_is_described_as_the_one_it_came_from_and_results_reads_that(tmp_path, name):
     document = read_campaign(name)
     (tmp_path / "campaign.yaml").write_text(dump(resolved(document, {})))
     again = read_campaign(str(tmp_path / "campaign.yaml"))
-    assert description_lines(make_plan(again)) == description_lines(make_plan(document))
+    first = written(document, tmp_path)
+    assert written(again, tmp_path) == first
+    plan = make_plan(document)
+    read = read_cases(tmp_path)
+    assert list(read) == [case.key for case in plan.cases]
+    assert [case.labels for case in read.values()] == [{**case.labels, **case.swept} for case in plan.cases]
 
 
 def test_a_run_writes_it_when_it_begins_and_the_same_when_it_goes_on(document, tmp_path):
@@ -95,4 +107,4 @@ def test_a_run_writes_it_when_it_begins_and_the_same_when_it_goes_on(document, t
     for _ in range(2):
         with open_store(tmp_path / "run", plan, campaign):
             pass
-        assert (tmp_path / "run" / "cases.jsonl").read_bytes() == description_lines(plan)
+        assert (tmp_path / "run" / "cases.jsonl").read_bytes() == written(campaign, tmp_path)

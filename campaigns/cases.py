@@ -16,12 +16,19 @@ from pydantic import BaseModel
 
 from conespot.campaigns.plan import Case, Plan
 from conespot.localize import find_localizer
+from conespot.results.cases import FILE
+from conespot.scene.atomic import write_atomically
 from conespot.scene.identity import SCHEMA, digest
 from conespot.scene.words import assumed
 
 
-def descriptions(plan: Plan) -> Iterator[dict[str, Any]]:
-    """What each case of a plan is, as plain data."""
+def write_cases(folder: Path, plan: Plan) -> None:
+    """Write what the cases of a plan are: the same whenever and wherever the same campaign is read."""
+    lines = "".join(f"{json.dumps(case, ensure_ascii=False)}\n" for case in _described(plan))
+    write_atomically(folder / FILE, lines.encode())
+
+
+def _described(plan: Plan) -> Iterator[dict[str, Any]]:
     for case in plan.cases:
         yield {
             "schema": SCHEMA,
@@ -36,11 +43,6 @@ def descriptions(plan: Plan) -> Iterator[dict[str, Any]]:
             "bounds": plan.campaign.bounds,
             "scene": _plain(case.scene),
         }
-
-
-def description_lines(plan: Plan) -> bytes:
-    """The file's content, the same whenever and wherever the same campaign is read."""
-    return "".join(f"{json.dumps(case, ensure_ascii=False)}\n" for case in descriptions(plan)).encode()
 
 
 def _words(localizer: str) -> dict[str, str]:
