@@ -65,20 +65,26 @@ class Bench:
         for _, alike in itertools.groupby(group.cases, key=lambda case: case.frame):
             cases = list(alike)
             power = cases[0].scene.power.value
-            image = exposure.frame(tiles, power, frame_seed(unit, cases[0]))
-            for case in cases:
-                unlit = self._unlit(unit, case, exposure, tiles)
-                bound = self._bound(case, pose)
-                for localizer in case.localizers:
-                    found = self._located(unit, case, image, localizer, unlit)
-                    stated = bound if find_localizer(localizer).takes_knowledge else None
-                    findings.append(_finding(case, localizer, found, stated))
-            if self._frames is not None:
-                radiance = background.copy()
-                for tile in tiles:
-                    radiance[tile.crop.slices] += np.float32(power) * tile.radiance
-                self._keep(f"{cases[0].frame}-{unit.pose:05d}", cases[0], pose, radiance, image)
+            with exposure.shown(tiles, power, frame_seed(unit, cases[0])) as image:
+                for case in cases:
+                    findings += self._findings(unit, case, image, self._unlit(unit, case, exposure, tiles))
+                if self._frames is not None:
+                    radiance = background.copy()
+                    for tile in tiles:
+                        radiance[tile.crop.slices] += np.float32(power) * tile.radiance
+                    self._keep(f"{cases[0].frame}-{unit.pose:05d}", cases[0], pose, radiance, image)
         return Record(unit=unit.key, findings=tuple(findings))
+
+    def _findings(self, unit: Unit, case: Case, image: AnyImage, unlit: Reference | None) -> list[Finding]:
+        """What the case's localizers find in a frame."""
+        bound = self._bound(case, self._plan.groups[unit.group].pose(unit.pose))
+        found = []
+        for localizer in case.localizers:
+            outcome = self._located(unit, case, image, localizer, unlit)
+            found.append(
+                _finding(case, localizer, outcome, bound if find_localizer(localizer).takes_knowledge else None)
+            )
+        return found
 
     def _located(self, unit: Unit, case: Case, image: AnyImage, localizer: str, unlit: Reference | None) -> Outcome:
         """What a localizer answers with what the case lets it know."""

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import contextlib
+from collections.abc import Iterator, Sequence
 from typing import Any, assert_never
 
 import numpy as np
@@ -14,8 +15,10 @@ from conespot.scene import srgb
 from conespot.scene.emva import Emva
 from conespot.scene.sensor import Linear, Sensor, Srgb8
 
+Pixels = NDArray[np.uint8] | NDArray[np.uint16]
 
-def encode(radiance: NDArray[np.floating[Any]], sensor: Srgb8 | Linear) -> NDArray[np.uint8] | NDArray[np.uint16]:
+
+def encode(radiance: NDArray[np.floating[Any]], sensor: Srgb8 | Linear) -> Pixels:
     """Pixel values of radiances [W m-2 sr-1], any shape: clipped at white, transferred, rounded to whole numbers.
 
     `srgb8` follows IEC 61966-2-1; `linear` is proportional.
@@ -44,12 +47,13 @@ class Exposure:
         match sensor:
             case Srgb8() | Linear():
                 self._encoded = np.concatenate([encode(band, sensor) for band in np.array_split(background, 16)])
+                self._canvas: Pixels | None = None  #: a copy of it, to paint on
             case Emva():
                 pass
             case unknown:
                 assert_never(unknown)
 
-    def frame(self, tiles: Sequence[Tile], power_w: float, seed: int = 0) -> NDArray[np.uint8] | NDArray[np.uint16]:
+    def frame(self, tiles: Sequence[Tile], power_w: float, seed: int = 0) -> Pixels:
         """The image `[H, W]`, or `[H, W, C]` of several channels, with every spotlight at `power_w` [W].
 
         `seed` decides the noise of an EMVA 1288 camera; a Bayer camera's raw frame is interpolated to three channels.
@@ -67,7 +71,36 @@ class Exposure:
             case unknown:
                 assert_never(unknown)
 
-    def dark(self, tiles: Sequence[Tile], power_w: float, seed: int = 0) -> NDArray[np.uint8] | NDArray[np.uint16]:
+    @contextlib.contextmanager
+    def shown(self, tiles: Sequence[Tile], power_w: float, seed: int = 0) -> Iterator[Pixels]:
+        """The image that `frame` gives, to look at while the context lasts: read-only, and gone afterwards.
+
+        Without noise no frame is copied: what the tiles touch is exposed, and taken back.
+        """
+        lit = [tile for tile in tiles if tile.radiance.size]
+        match self.sensor:
+            case Emva() as camera:
+                yield self._noisy(camera, lit, power_w, seed)
+            case Srgb8() | Linear() as sensor:
+                # whoever looks at a second frame meanwhile gets a canvas of its own
+                canvas = self._encoded.copy() if self._canvas is None else self._canvas
+                self._canvas, touched = None, []
+                try:
+                    if lit:
+                        crop, radiance = self._lit(lit, power_w)
+                        touched.append(crop.slices)
+                        canvas[crop.slices] = encode(radiance, sensor)
+                    image = canvas[..., 0] if canvas.shape[-1] == 1 else canvas[:]
+                    image.flags.writeable = False
+                    yield image
+                finally:
+                    for where in touched:
+                        canvas[where] = self._encoded[where]
+                    self._canvas = canvas
+            case unknown:
+                assert_never(unknown)
+
+    def dark(self, tiles: Sequence[Tile], power_w: float, seed: int = 0) -> Pixels:
         """The image without spotlights, at the exposure of the frame with these tiles at `power_w` [W]."""
         match self.sensor:
             case Emva() as camera:
@@ -98,9 +131,7 @@ class Exposure:
         crop, total = merged(tiles)
         return crop, self._background[crop.slices] + np.float32(power_w) * total
 
-    def _noisy(
-        self, camera: Emva, lit: Sequence[Tile], power_w: float, seed: int
-    ) -> NDArray[np.uint8] | NDArray[np.uint16]:
+    def _noisy(self, camera: Emva, lit: Sequence[Tile], power_w: float, seed: int) -> Pixels:
         signal = self._background
         if lit:
             crop, radiance = self._lit(lit, power_w)
@@ -121,7 +152,7 @@ class Exposure:
         return self._metered(camera, lit, power_w) if anew else camera
 
     @staticmethod
-    def _digital(camera: Emva, signal: NDArray[np.float32], seed: int) -> NDArray[np.uint8] | NDArray[np.uint16]:
+    def _digital(camera: Emva, signal: NDArray[np.float32], seed: int) -> Pixels:
         raw = emva.expose(signal, camera, seed)
         return emva.demosaic(raw) if signal.shape[-1] == 3 else raw
 
