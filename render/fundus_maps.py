@@ -49,7 +49,7 @@ class FundusMaps:
         repeats = -(-n // len(tile))
         grain = 1.0 + np.tile(tile, (repeats, repeats))[:n, :n]
         choroid = float(fundus.scatter(wavelength))
-        mu = float(fundus.blood_absorption(wavelength, fundus.CHOROID_SATURATION))
+        mu = float(fundus.blood_absorption(wavelength, fundus.BLOOD.choroid_saturation))
         absorbed = np.exp(-2.0 * np.log(10.0) * coarse["melanin"] * grain * float(fundus.melanin_template(wavelength)))
         absorbed *= np.exp(-2.0 * mu * coarse["blood"] * grain)
         tissue = coarse["epithelium"] + (1.0 - coarse["epithelium"]) ** 2 * absorbed * choroid
@@ -59,7 +59,7 @@ class FundusMaps:
         for name, saturation in (("artery", retina.artery_saturation), ("vein", retina.vein_saturation)):
             path = _resized(getattr(self, name), n)
             through = np.exp(-2.0 * float(fundus.blood_absorption(wavelength, saturation)) * path)
-            surface *= fundus.VESSEL_BYPASS + (1.0 - fundus.VESSEL_BYPASS) * through
+            surface *= fundus.BLOOD.bypass + (1.0 - fundus.BLOOD.bypass) * through
         return np.asarray(surface, np.float32)
 
     def band(self, weight: Curve, retina: Fundus, texel: float = FINE, steps: int = 16) -> Map:

@@ -90,14 +90,14 @@ def photographed() -> Anatomy:
     vesselness = _dark_ridges(green)
     mask = _vessel_mask(vesselness)
     wide = cv2.dilate(mask, cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (PHOTO.wider, PHOTO.wider))).astype(np.uint8)
-    green_excess = green - _background(green, wide)
-    red_excess = red - _background(red, wide)
+    green_excess = green - _background(green, wide, PHOTO.background)
+    red_excess = red - _background(red, wide, PHOTO.background)
     soft = cv2.GaussianBlur(mask.astype(np.float32), (0, 0), PHOTO.soft)
     weight = np.clip(PHOTO.soft_gain * soft, 0.0, 1.0) * np.maximum(green_excess, 0.0)
     venous = _venous(green_excess, red_excess, mask)
     artery, vein = (_paths(weight * share, saturation, depth) for share, saturation, depth in (
-        (1.0 - venous, fundus.ARTERY_SATURATION, fundus.ARTERY_DEPTH),
-        (venous, fundus.VEIN_SATURATION, fundus.VEIN_DEPTH),
+        (1.0 - venous, fundus.BLOOD.artery_saturation, fundus.BLOOD.artery_depth),
+        (venous, fundus.BLOOD.vein_saturation, fundus.BLOOD.vein_depth),
     ))  # fmt: skip
     disc = _disc_mask()
     melanin, blood, epithelium = _pigment(green, red, np.maximum(wide, (disc > PHOTO.disc_from).astype(np.uint8)))
@@ -149,9 +149,7 @@ def _onto(photo: NDArray[np.float32], texel: float, *, fade: bool = False) -> Ma
     return np.asarray(values, np.float32)
 
 
-def _background(
-    density: NDArray[np.float32], excluded: NDArray[np.uint8], sigma: float = PHOTO.background
-) -> NDArray[np.float32]:
+def _background(density: NDArray[np.float32], excluded: NDArray[np.uint8], sigma: float) -> NDArray[np.float32]:
     """The density around the vessels: a blur that leaves out the excluded pixels."""
     keep = 1.0 - excluded.astype(np.float32)
     norm = cv2.GaussianBlur(keep, (0, 0), sigma)
@@ -216,9 +214,8 @@ def _paths(excess: NDArray[np.float32], saturation: float, deepest: float) -> ND
     reference = float(np.percentile(excess[excess > PHOTO.least_excess], PHOTO.darkest_vessels))
     densest = float(fundus.vessel_density(550.0, saturation, deepest))
     transmission = np.power(10.0, -np.clip(excess / reference, 0.0, PHOTO.most_density) * densest)
-    return np.asarray(
-        np.minimum(fundus.vessel_depth(transmission, 550.0, saturation), PHOTO.most_path * deepest), np.float32
-    )
+    depth = fundus.vessel_depth(transmission, 550.0, saturation)
+    return np.asarray(np.minimum(depth, PHOTO.most_path * deepest), np.float32)
 
 
 def _disc_mask() -> NDArray[np.float32]:
@@ -232,9 +229,8 @@ def _pigment(
 ) -> tuple[NDArray[np.float32], ...]:
     """Relative changes of melanin, blood and the reflectance before them: densities of 0.1 to 1 mm, vessels left out.
 
-    Red sees the melanin, 0.8 of density per unit at 650 nm. Green at medium pigmentation hardly passes it: there the
-    change is one of the epithelium's and nerve fibres' reflectance, and what red does not share is blood (0.25 of
-    density per relative change at 550 nm, half of it).
+    Red sees the melanin. Green at medium pigmentation hardly passes it: there the change is one of the epithelium's and
+    nerve fibres' reflectance, and of what red does not share part is blood.
     """
     filled = [_background(d, excluded, PHOTO.fill) * excluded + d * (1 - excluded) for d in (green, red)]
     bands = [cv2.GaussianBlur(d, (0, 0), PHOTO.fine) - _wide_blur(d, PHOTO.coarse) for d in filled]

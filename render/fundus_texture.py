@@ -55,7 +55,7 @@ def fundus_texture(mi: Any, dr: Any, maps: FundusMaps, retina: Fundus, extent: f
                 tissue = (epithelium + dr.square(1.0 - epithelium) * scatter * absorbed) * dr.exp(-yellow * macular)
                 surface = dr.lerp(tissue, white, disc)
                 for path, mu in ((artery, arterial), (vein, venous)):
-                    surface *= fundus.VESSEL_BYPASS + (1.0 - fundus.VESSEL_BYPASS) * dr.exp(-mu * path)
+                    surface *= fundus.BLOOD.bypass + (1.0 - fundus.BLOOD.bypass) * dr.exp(-mu * path)
                 result[i] = surface
             return result & active
 
@@ -87,7 +87,7 @@ def _spectra(retina: Fundus) -> NDArray[np.float32]:
     x = np.arange(_LOW, _HIGH + 1.0)
     columns = [
         2.0 * _LN10 * fundus.melanin_template(x),
-        2.0 * fundus.blood_absorption(x, fundus.CHOROID_SATURATION),
+        2.0 * fundus.blood_absorption(x, fundus.BLOOD.choroid_saturation),
         2.0 * fundus.blood_absorption(x, retina.artery_saturation),
         2.0 * fundus.blood_absorption(x, retina.vein_saturation),
         fundus.scatter(x),

@@ -44,8 +44,8 @@ def grown(rng: np.random.Generator) -> Anatomy:
         blood=np.clip(blood, -g.most_blood, g.most_blood).astype(np.float32),
         epithelium=np.clip(epithelium, -g.most_epithelium, g.most_epithelium).astype(np.float32),
         disc=mask.astype(np.float32),
-        artery=_depths(arteries, fundus.ARTERY_DEPTH, g.artery_trunk),
-        vein=_depths(veins, fundus.VEIN_DEPTH, g.vein_trunk),
+        artery=_depths(arteries, fundus.BLOOD.artery_depth, g.artery_trunk),
+        vein=_depths(veins, fundus.BLOOD.vein_depth, g.vein_trunk),
     )
 
 

@@ -20,17 +20,25 @@ from conespot.scene.spectrum import tabulated
 
 Array = NDArray[np.float64]
 
-#: oxygen saturation of the choroid's blood
-CHOROID_SATURATION = 0.95
-ARTERY_SATURATION = 0.97
-VEIN_SATURATION = 0.60
-#: blood path of a large retinal artery and vein, single pass [um]
-ARTERY_DEPTH = 80.0
-VEIN_DEPTH = 110.0
-#: part of the light over a vessel that never crosses its blood: surface reflection and scatter round it
-VESSEL_BYPASS = 0.35
-#: blood in front of the optic disc's white tissue, single pass [um]
-DISC_BLOOD = 7.5
+
+@dataclass(frozen=True)
+class Blood:
+    """Oxygen saturations, and blood paths, single pass [um].
+
+    Chosen, within what is known of human eyes, so that large vessels have the optical densities of `VESSELS` in
+    tests/unit/scene/test_fundus.py (0.45 at 570 nm, 0.03 at 850 nm) and the disc is white.
+    """
+
+    choroid_saturation: float = 0.95
+    artery_saturation: float = 0.97
+    vein_saturation: float = 0.60
+    artery_depth: float = 80.0  #: of a large retinal artery
+    vein_depth: float = 110.0  #: of a large retinal vein
+    bypass: float = 0.35  #: part of the light over a vessel that never crosses its blood
+    disc: float = 7.5  #: in front of the optic disc's white tissue
+
+
+BLOOD = Blood()
 #: length of the vitreous on the way to the camera [mm]
 VITREOUS_LENGTH = 24.0
 
@@ -83,7 +91,7 @@ def reflectance(wavelength: ArrayLike, pigments: Pigments) -> Array:
     [0.018, 0.068, 0.125]
     """
     l = np.asarray(wavelength, float)  # noqa: E741 - the formula's own letter
-    choroid = scatter(l) * np.exp(-2.0 * blood_absorption(l, CHOROID_SATURATION) * pigments.blood)
+    choroid = scatter(l) * np.exp(-2.0 * blood_absorption(l, BLOOD.choroid_saturation) * pigments.blood)
     behind = (1.0 - pigments.epithelium) ** 2 * 10.0 ** (-2.0 * pigments.melanin * melanin_template(l)) * choroid
     return np.asarray(10.0 ** (-2.0 * pigments.macular * macular_template(l)) * (pigments.epithelium + behind))
 
@@ -91,7 +99,7 @@ def reflectance(wavelength: ArrayLike, pigments: Pigments) -> Array:
 def vessel_transmission(wavelength: ArrayLike, saturation: float, depth: float) -> Array:
     """What a vessel of blood path `depth` [um], passed twice, leaves of the fundus' reflectance."""
     blood = np.exp(-2.0 * blood_absorption(wavelength, saturation) * depth)
-    return np.asarray(VESSEL_BYPASS + (1.0 - VESSEL_BYPASS) * blood)
+    return np.asarray(BLOOD.bypass + (1.0 - BLOOD.bypass) * blood)
 
 
 def vessel_density(wavelength: ArrayLike, saturation: float, depth: float) -> Array:
@@ -99,9 +107,11 @@ def vessel_density(wavelength: ArrayLike, saturation: float, depth: float) -> Ar
     return np.asarray(-np.log10(vessel_transmission(wavelength, saturation, depth)))
 
 
-def disc_reflectance(wavelength: ArrayLike, blood: float = DISC_BLOOD) -> Array:
+def disc_reflectance(wavelength: ArrayLike, blood: float = BLOOD.disc) -> Array:
     """Reflectance of the optic disc: no pigment, a little blood [um] over white tissue."""
-    return np.asarray(scatter(wavelength) * np.exp(-2.0 * blood_absorption(wavelength, CHOROID_SATURATION) * blood))
+    return np.asarray(
+        scatter(wavelength) * np.exp(-2.0 * blood_absorption(wavelength, BLOOD.choroid_saturation) * blood)
+    )
 
 
 def lens_density(wavelength: ArrayLike, age: float = 28.0, density_420: float = 0.45) -> Array:
@@ -142,7 +152,7 @@ def macular_profile(eccentricity_deg: ArrayLike) -> Array:
 def vessel_depth(transmission: ArrayLike, wavelength: float, saturation: float) -> Array:
     """The blood path [um] that `vessel_transmission` turns into a transmission; infinite at the bypass and below."""
     t = np.asarray(transmission, float)
-    crossed = (t - VESSEL_BYPASS) / (1.0 - VESSEL_BYPASS)
+    crossed = (t - BLOOD.bypass) / (1.0 - BLOOD.bypass)
     mu = float(blood_absorption(wavelength, saturation))
     with np.errstate(divide="ignore"):
         return np.where(crossed > 0.0, -np.log(np.maximum(crossed, math.ulp(0.0))) / (2.0 * mu), np.inf)

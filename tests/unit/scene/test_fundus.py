@@ -43,8 +43,8 @@ def test_vessels_have_the_stated_optical_density(wavelength):
     """Density of an 80 um artery and a 110 um vein; against the stated values; within 10 % or half their last digit."""
     artery, vein = VESSELS[wavelength]
     for stated, saturation, depth in (
-        (artery, fundus.ARTERY_SATURATION, fundus.ARTERY_DEPTH),
-        (vein, fundus.VEIN_SATURATION, fundus.VEIN_DEPTH),
+        (artery, fundus.BLOOD.artery_saturation, fundus.BLOOD.artery_depth),
+        (vein, fundus.BLOOD.vein_saturation, fundus.BLOOD.vein_depth),
     ):
         ours = float(fundus.vessel_density(wavelength, saturation, depth))
         assert ours == pytest.approx(stated, rel=0.1, abs=0.0005)
