@@ -95,7 +95,7 @@ def find_rings(
     radii = tuple(np.geomspace(low, high, max(3, round(math.log(high / low, START.radius_ratio)) + 1)).tolist())
     size = int(fft.next_fast_len(n + math.ceil(high) + 2, real=True))
     field = fft.rfft2(np.stack([gx * vote, gy * vote]), s=(size, size))
-    kernels = _kernels(size, radii)
+    kernels = ring_kernels(size, radii)
     votes = fft.irfft2(field[0] * kernels[:, 0] + field[1] * kernels[:, 1], s=(size, size))[:, :n, :n]
     y, x = np.ogrid[:n, :n]
     found = []
@@ -123,7 +123,7 @@ def _summit(votes: NDArray[np.float32], peak: tuple[int, int, int], axis: int) -
 
 
 @lru_cache(maxsize=4)
-def _kernels(size: int, radii: tuple[float, ...]) -> NDArray[np.complex64]:
+def ring_kernels(size: int, radii: tuple[float, ...]) -> NDArray[np.complex64]:
     """Transforms `[R, 2, size, size / 2 + 1]` of inward unit vectors along rings, conjugate: products correlate."""
     y = np.arange(size)
     y = np.where(y > size // 2, y - size, y).astype(float)

@@ -1,6 +1,6 @@
 """What the theory says of a scene, as plain records: Table I, bounds, error budget and design guidance.
 
-Everything is asked for two tips: `LOW`, on the optical axis near the retina, and `HIGH`, aside and farther from it.
+Everything is asked for two tips of `TheorySettings`, `low` and `high`.
 """
 
 from __future__ import annotations
@@ -15,6 +15,7 @@ from conespot.localize.model.prior import Estimate, Knowns, prior_rows
 from conespot.localize.theory.bounds import Bound, Electrons, cramer_rao, error_budget, smoothed_over
 from conespot.localize.theory.conic import table_1
 from conespot.localize.theory.design import beam_of, compare_designs
+from conespot.localize.theory.settings import THEORY
 from conespot.scene.document import InputError
 from conespot.scene.emva import Emva
 from conespot.scene.pose import Pose
@@ -24,17 +25,9 @@ from conespot.scene.surface import bump_grid
 
 Record = dict[str, str | float]
 
-LOW, HIGH = (0.0, 0.0, 3.0), (2.0, 0.0, 6.0)
-RESOLUTIONS = (5000, 1000)
 #: how well the bounds know the RCM [mm]
 _RCM: dict[str, float | None] = {"free": None, "0.05 mm": 0.05, "exact": 0.0}
-#: the ring of tips over which bumps are averaged: its radius, the helix's [mm], and how many
-_RING, _TURNS = 2.0, 90
-#: designs are compared at no more than this [px]: their ratios hardly depend on it, and the time does
-DESIGN_RESOLUTION = 1000
-_HALF_ANGLES = tuple(math.radians(a) for a in (5.0, 7.0, 9.0, 11.0, 13.0, 15.0))
-_SOFTNESS = (0.0, 0.1, 0.2, 0.3, 0.5, 0.7, 1.0)
-_COUNTS, _SPREADS = (1, 2, 3, 4, 6), tuple(math.radians(a) for a in (5.0, 8.0, 11.0, 14.0))
+_TIPS = " and ".join(f"({', '.join(f'{c:g}' for c in tip)}) mm" for tip in (THEORY.low, THEORY.high))
 
 
 @dataclass(frozen=True)
@@ -60,7 +53,7 @@ def assess(scene: Scene) -> Assessment:
             _assumes(scene, sensor),
         )
     except ValueError as error:
-        raise InputError(f"scene: {error}; the theory is for tips at {_words(LOW)} and {_words(HIGH)}") from None
+        raise InputError(f"scene: {error}; the theory is for tips at {_TIPS}") from None
 
 
 def electrons_of(scene: Scene) -> Electrons:
@@ -72,7 +65,7 @@ def electrons_of(scene: Scene) -> Electrons:
         case Srgb8() | Linear():
             return Electrons()
         case Emva() as camera:
-            level = camera.metering.level if camera.metering else 0.8
+            level = camera.metering.level if camera.metering else THEORY.metered_level
             background = math.sqrt(camera.read_noise**2 + 1.0 / (12.0 * camera.gain**2))
             return Electrons(level * camera.saturation, background)
         case unknown:
@@ -105,10 +98,10 @@ def _table_1() -> list[Record]:
 
 def _bounds(scene: Scene, sensor: Electrons) -> list[Record]:
     found: list[Record] = []
-    for resolution in RESOLUTIONS:
+    for resolution in THEORY.resolutions:
         for edge, softness in {"hard": 0.0, "soft": 1.0}.items():
             changed = _at(scene, resolution=resolution, softness=softness)
-            for tip in (LOW, HIGH):
+            for tip in (THEORY.low, THEORY.high):
                 pose = changed.pose(np.array(tip))
                 free = cramer_rao(changed, pose, sensor)
                 for rcm, sigma in _RCM.items():
@@ -120,7 +113,7 @@ def _bounds(scene: Scene, sensor: Electrons) -> list[Record]:
 
 def _budget(scene: Scene, sensor: Electrons) -> list[Record]:
     found: list[Record] = []
-    for tip in (LOW, HIGH):
+    for tip in (THEORY.low, THEORY.high):
         pose = scene.pose(np.array(tip))
         sides = (scene.camera.resolution, scene.camera.resolution // 2)
         free = [cramer_rao(_at(scene, resolution=side), pose, sensor) for side in sides]
@@ -152,25 +145,25 @@ def _in_degrees(quantity: str, tolerance: float) -> tuple[float, str]:
 def _bumps(scene: Scene, height: float, *, rcm: bool) -> tuple[float, float]:
     """What the paper's bumps do to a fit that does not know them, root mean square over a ring of tips [mm, rad]."""
     bumpy = scene.model_copy(update={"surface": bump_grid()})
-    turns = 2.0 * math.pi * np.arange(_TURNS) / _TURNS
-    tips = [np.array([_RING * math.cos(t), _RING * math.sin(t), height]) for t in turns]
+    turns = 2.0 * math.pi * np.arange(THEORY.bump_tips) / THEORY.bump_tips
+    tips = [np.array([THEORY.bump_ring * math.cos(t), THEORY.bump_ring * math.sin(t), height]) for t in turns]
     steps = np.array([smoothed_over(bumpy, scene.pose(tip), rcm=rcm) for tip in tips])
     return float(np.sqrt(np.mean(steps[:, :3] ** 2) * 3.0)), float(np.sqrt(np.mean(steps[:, 3:5] ** 2) * 2.0))
 
 
 def _design(scene: Scene, sensor: Electrons) -> list[Record]:
-    coarse = _at(scene, resolution=min(scene.camera.resolution, DESIGN_RESOLUTION))
-    rigs = [(n, spread) for n in _COUNTS for spread in (_SPREADS if n > 1 else (0.0,))]
+    coarse = _at(scene, resolution=min(scene.camera.resolution, THEORY.design_resolution))
+    rigs = [(n, spread) for n in THEORY.spotlights for spread in (THEORY.spreads if n > 1 else (0.0,))]
     varied: dict[str, dict[str, Any]] = {
-        "half angle": {"half_angles": _HALF_ANGLES},
-        "edge softness": {"softness": _SOFTNESS},
+        "half angle": {"half_angles": THEORY.half_angles},
+        "edge softness": {"softness": THEORY.softness},
         "spotlights": {"rigs": rigs},
     }
     found: list[Record] = []
     for what, values in varied.items():
         for rcm in ("free", "exact"):
             known = Knowns(rcm_sigma_mm=_RCM[rcm])
-            for design in compare_designs(coarse, (LOW, HIGH), sensor=sensor, knowns=known, **values):
+            for design in compare_designs(coarse, (THEORY.low, THEORY.high), sensor=sensor, knowns=known, **values):
                 row: Record = {"half_angle_deg": math.degrees(design.half_angle), "softness": design.softness}
                 row |= {"spotlights": design.spotlights, "spread_deg": math.degrees(design.spread)}
                 errors = {"position_um": 1e3 * design.position_mm, "axis_deg": math.degrees(design.axis_rad)}
@@ -185,12 +178,8 @@ def _assumes(scene: Scene, sensor: Electrons) -> str:
         "Square pixels that average exactly, no other blur; Gaussian noise of variance signal +"
         f" ({background} e-)^2, independent between pixels; {peak} e- where the patch is brightest; albedo uniform or"
         " known, gain and offset unknown. The budget is of an outline fit that weighs all points alike; bumps are those"
-        f" of the paper, averaged over tips {_RING:g} mm aside. Designs have the same {peak} e- each, at"
-        f" {min(camera.resolution, DESIGN_RESOLUTION)} px; a beam other than `cycles` counts as hard there. Eye of"
-        f" {scene.eye.radius:g} mm, camera {camera.height:g} mm above the pole, half angle"
-        f" {math.degrees(scene.beam.half_angle):g} deg, tips at {_words(LOW)} and {_words(HIGH)}."
+        f" of the paper, averaged over tips {THEORY.bump_ring:g} mm aside. Designs have the same {peak} e- each, at"
+        f" {min(camera.resolution, THEORY.design_resolution)} px; a beam other than `cycles` counts as hard there. Eye"
+        f" of {scene.eye.radius:g} mm, camera {camera.height:g} mm above the pole, half angle"
+        f" {math.degrees(scene.beam.half_angle):g} deg, tips at {_TIPS}."
     )
-
-
-def _words(tip: tuple[float, float, float]) -> str:
-    return f"({', '.join(f'{c:g}' for c in tip)}) mm"

@@ -1,13 +1,12 @@
 """How good it could be: Cramer-Rao bounds, what every tolerance costs, and what a better design would gain.
 
-Pixel model, stated with every bound: square box pixels that average exactly (`localize.forward`), no other blur;
+Pixel model, stated with every bound: square box pixels that average exactly (`localize.model.forward`), no other blur;
 Gaussian noise of variance signal + background noise^2 [e-^2], independent between pixels; the patch's peak at `peak`
 electrons; uniform albedo, or albedo known exactly; gain and offset unknown.
 """
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -19,28 +18,20 @@ from conespot.localize.model.outline import distances
 from conespot.localize.model.prior import BEAM, Estimate, Knowns, prior_rows, value, with_value
 from conespot.localize.model.profile import Profile
 from conespot.localize.model.solve import inverse
+from conespot.localize.theory.settings import THEORY
 from conespot.scene.pose import Pose
 from conespot.scene.scene import Scene
 from conespot.scene.surface import Surface
 
 Array = NDArray[np.float64]
-#: quantities whose tolerances the error budget states, with the tolerance it assumes
-TOLERANCES = {
-    "half_angle": math.radians(0.01),
-    "eye_radius": 0.1,
-    "camera_height": 0.1,
-    "focal_length": 0.3,
-    "rcm_sideways": 0.05,
-    "rcm_along": 0.05,
-}
 
 
 @dataclass(frozen=True)
 class Electrons:
     """The sensor of a bound: `peak` electrons where the patch is brightest, `background` noise in every pixel [e-]."""
 
-    peak: float = 9000.0
-    background: float = 15.0
+    peak: float = THEORY.peak
+    background: float = THEORY.background
 
 
 @dataclass(frozen=True)
@@ -60,14 +51,20 @@ class Bound:
         return float(np.sqrt(np.trace(self.covariance[3:5, 3:5])))
 
 
-def patch_pixels(scene: Scene, pose: Pose, margin: float = 3.0) -> Array:
+def patch_pixels(scene: Scene, pose: Pose, margin: float = THEORY.margin_px) -> Array:
     """Centres `[N, 2]` [px] of the frame's pixels around all patches of a pose, `margin` [px] beyond the outlines."""
-    points = np.concatenate([scene.camera.project(scene.outline(pose, k, 128)) for k in range(len(scene.spotlights))])
+    points = np.concatenate(_outlines(scene, pose))
     edge = scene.camera.shape[::-1]
     points = points[np.all(np.isfinite(points), axis=1)]
     low = np.clip(np.floor(points.min(axis=0) - margin), 0, edge).astype(int)
     high = np.clip(np.ceil(points.max(axis=0) + margin), 0, edge).astype(int)
     return window(int(low[1]), int(low[0]), int(high[1] - low[1]), int(high[0] - low[0]))
+
+
+def _outlines(scene: Scene, pose: Pose) -> list[Array]:
+    """Every spotlight's outline in the image `[N, 2]` [px]."""
+    count = THEORY.outline_points
+    return [scene.camera.project(scene.outline(pose, k, count)) for k in range(len(scene.spotlights))]
 
 
 def cramer_rao(
@@ -84,7 +81,7 @@ def cramer_rao(
     estimate = Estimate(pose, scene)
     size = estimate.pose_size
     here = _light(scene, pose, pixels, pose_size=size, changes=estimate.beam_changes(knowns.free))
-    peak = float(np.quantile(here.value[here.value > 0.0], 0.999)) if np.any(here.value > 0.0) else 0.0
+    peak = float(np.quantile(here.value[here.value > 0.0], THEORY.peak_quantile)) if np.any(here.value > 0.0) else 0.0
     if peak <= 0.0:
         raise ValueError("the frame shows no patch of this pose")
     gain = sensor.peak / peak
@@ -120,7 +117,7 @@ def _light(
 
 
 def _difference(scene: Scene, pose: Pose, pixels: Array, name: str) -> Array:
-    step = 1e-4
+    step = THEORY.difference
     sides = [_light(with_value(scene, name, value(scene, name) + s), pose, pixels).value for s in (step, -step)]
     return (sides[0] - sides[1]) / (2.0 * step)
 
@@ -154,10 +151,10 @@ def error_budget(
     the RCM's own error passes through; without, the fit is free and the RCM has no part in it.
     """
     found = []
-    for name, tolerance in (TOLERANCES | (tolerances or {})).items():
+    for name, tolerance in (THEORY.tolerances | (tolerances or {})).items():
         if name.startswith("rcm") and not rcm:
             continue
-        step = 1e-4
+        step = THEORY.difference
         moves = [_believed(scene, pose, name, sign * step, rcm=rcm) for sign in (1.0, -1.0)]
         derivative = (moves[0] - moves[1]) / (2.0 * step)
         found.append(Contribution(name, tolerance, derivative[:3], float(np.hypot(derivative[3], derivative[4]))))
@@ -166,8 +163,10 @@ def error_budget(
 
 def _believed(scene: Scene, pose: Pose, name: str, error: float, *, rcm: bool) -> Array:
     """The step `[5 or 6]` an outline fit takes off the truth when it believes `name` to be larger by `error`."""
-    outlines = [scene.camera.project(scene.outline(pose, k, 256)) for k in range(len(scene.spotlights))]
-    spots = np.repeat(np.arange(len(outlines)), 256)
+    outlines = [
+        scene.camera.project(scene.outline(pose, k, THEORY.outline_points)) for k in range(len(scene.spotlights))
+    ]
+    spots = np.repeat(np.arange(len(outlines)), THEORY.outline_points)
     pixels = np.concatenate(outlines)
     believed = scene
     if name == "focal_length":
@@ -185,9 +184,11 @@ def _believed(scene: Scene, pose: Pose, name: str, error: float, *, rcm: bool) -
 
 def smoothed_over(scene: Scene, pose: Pose, *, rcm: bool) -> Array:
     """The step `[5 or 6]` [mm, rad] an outline fit takes off the truth when it takes the scene's surface for smooth."""
-    outlines = [scene.camera.project(scene.outline(pose, k, 256)) for k in range(len(scene.spotlights))]
+    outlines = [
+        scene.camera.project(scene.outline(pose, k, THEORY.outline_points)) for k in range(len(scene.spotlights))
+    ]
     smooth = scene.model_copy(update={"surface": Surface()})
-    spots = np.repeat(np.arange(len(outlines)), 256)
+    spots = np.repeat(np.arange(len(outlines)), THEORY.outline_points)
     return _step(np.concatenate(outlines), spots, Estimate(pose, smooth), rcm=rcm)
 
 

@@ -13,10 +13,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from conespot.localize.theory.settings import THEORY
+
 Array = NDArray[np.float64]
 
-#: the paper's half angles [rad]
-HALF_ANGLES = tuple(math.radians(d) for d in (5.0, 7.0, 9.0, 11.0, 13.0, 15.0))
 #: Table I: a vertical axis, the apex 5 mm above the pole of a 12 mm sphere and x0 aside
 _TABLE_RADIUS, _TABLE_X0, _TABLE_Z0 = 12.0, 4.45, -7.0
 #: the volume of interest (sections 1 and 3.3): half width [mm], height above the pole [mm], and the RCM [mm]
@@ -75,13 +75,13 @@ class ConeSphere:
         z = z_b + (z_a - z_b) * (at - low) / (high - low)
         return np.sqrt(np.maximum(self.slope**2 * z * z - at * at, 0.0)), z
 
-    def in_plane_difference(self, points: int = 4001) -> float:
+    def in_plane_difference(self, points: int = THEORY.in_plane_points) -> float:
         """Largest |y - y'| at equal x [mm], the number of Table I."""
         low, high = self.interval
         x = (low + high) / 2.0 + (high - low) / 2.0 * np.cos(np.linspace(0.0, math.pi, points))
         return float(np.max(np.abs(self.curve(x)[0] - self.ellipse(x)[0])))
 
-    def distance(self, points: int = 1001) -> float:
+    def distance(self, points: int = THEORY.space_points) -> float:
         """Largest distance in space between curve and ellipse along the cone's generators [mm]."""
         return float(_distances(self.half_angle, np.array([self.x0]), np.array([self.z0]), self.radius, points)[0])
 
@@ -101,13 +101,13 @@ def _distances(half_angle: float, x0: Array, z0: Array, radius: float, points: i
     return np.asarray(np.max(np.abs(curve - ellipse), axis=1))
 
 
-def volume_distance(half_angle: float, radius: float = _TABLE_RADIUS, steps: int = 10) -> float:
+def volume_distance(half_angle: float, radius: float = _TABLE_RADIUS, cells: int = THEORY.volume_cells) -> float:
     """Largest distance between curve and ellipse [mm] for tips in the volume of interest, axis through the RCM.
 
-    The volume is the 10 x 10 x 5 mm above the pole, as far as it is inside the eye, on a grid of `steps` x `steps`
-    x `steps` cells, corners included.
+    The volume is the 10 x 10 x 5 mm above the pole, as far as it is inside the eye, on a grid of `cells` x `cells`
+    x `cells` cells, corners included.
     """
-    side, up = np.linspace(-_HALF_WIDTH, _HALF_WIDTH, steps + 1), np.linspace(0.0, _HEIGHT, steps + 1)
+    side, up = np.linspace(-_HALF_WIDTH, _HALF_WIDTH, cells + 1), np.linspace(0.0, _HEIGHT, cells + 1)
     tips = np.stack(np.meshgrid(side, side, up, indexing="ij"), axis=-1).reshape(-1, 3)
     centre = np.array([0.0, 0.0, radius]) - tips
     inside = np.linalg.norm(centre, axis=-1) < radius
@@ -115,7 +115,7 @@ def volume_distance(half_angle: float, radius: float = _TABLE_RADIUS, steps: int
     axis /= np.linalg.norm(axis, axis=-1, keepdims=True)
     z0 = np.sum(centre * axis, axis=-1)
     x0 = np.linalg.norm(centre - z0[:, None] * axis, axis=-1)
-    return float(np.max(_distances(half_angle, x0[inside], z0[inside], radius, 201)))
+    return float(np.max(_distances(half_angle, x0[inside], z0[inside], radius, THEORY.volume_points)))
 
 
 @dataclass(frozen=True)
@@ -128,7 +128,7 @@ class TableRow:
     volume_distance_um: float  #: largest distance in space over the volume of interest
 
 
-def table_1(half_angles: Sequence[float] = HALF_ANGLES) -> list[TableRow]:
+def table_1(half_angles: Sequence[float] = THEORY.half_angles) -> list[TableRow]:
     """Table I for half angles [rad], in the paper's sense and in space.
 
     Raises ValueError for an angle outside 0 to 45 deg.

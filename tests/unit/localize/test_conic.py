@@ -36,7 +36,7 @@ def test_in_space_the_curves_lie_further_apart_than_in_the_plane():
 
 
 def test_the_grid_over_the_volume_is_fine_enough():
-    assert volume_distance(math.radians(9.0), steps=20) == pytest.approx(volume_distance(math.radians(9.0)), rel=0.005)
+    assert volume_distance(math.radians(9.0), cells=20) == pytest.approx(volume_distance(math.radians(9.0)), rel=0.005)
 
 
 @given(cones)
