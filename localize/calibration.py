@@ -38,10 +38,15 @@ _FIXED = 1e-9
 class CalibrationSettings:
     """Tuned numbers of the calibration."""
 
+    #: how many times smaller than its prior's a sigma must become for a quantity to count as observable: a definition
     observable: float = 3.0
+    #: times that frames are fitted around the values found last
     rounds: int = 3
+    #: information below this share of the prior's is none: rounding pulls where a frame says nothing
     least: float = 1e-2
+    #: a frame whose step, squared, is this many times the median's is left out: a vessel or a glint misled it
     outlier: float = 30.0
+    #: how a single frame's fit is held to the common values: it only has to be well conditioned, and comes off again
     tight: Knowns = Knowns(  # noqa: RUF009  frozen
         rcm_sigma_mm=0.02,
         half_angle_sigma_deg=0.003,

@@ -29,8 +29,11 @@ Array = NDArray[np.float64]
 class SequenceSettings:
     """Tuned numbers of learning the ambient view."""
 
+    #: kept out around a patch, over its size, and beside [px]: a start is good to a twentieth of it, and light of a
+    #: patch in the view of the retina would be taken for albedo
     margin: float = 0.25
     margin_px: float = 3.0
+    #: frames without which there is no view: one hides what its own patch covers
     fewest: int = 2
 
 

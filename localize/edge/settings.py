@@ -1,4 +1,4 @@
-"""The tuned numbers of the edge fit."""
+"""The tuned numbers of the edge fit; `benchmarks/tuned_numbers.py edge` halves and doubles each."""
 
 from __future__ import annotations
 
@@ -12,38 +12,61 @@ class Level:
     bins: int | None  #: across a patch; None: every pixel is a bin
     inner: float  #: bins inside the outline
     outer: float  #: bins outside
-    iterations: int
+    iterations: int  #: at most
 
 
 @dataclass(frozen=True)
 class EdgeSettings:
     """Tuned numbers of the edge fit."""
 
+    #: share of the half angle beyond which half the profile's height makes its edge a step: a Cycles blend below 0.12
     sharp: float = 0.97
+    #: shares of its middle from which on a patch counts as clipped, and as clipped throughout
     clipped: float = 0.3
     throughout: float = 0.9
+    #: half the side of that middle, over the patch's width
     middle: float = 0.2
+    #: points of an outline in the frame without which there is nothing to fit: twice the pose's parameters
     fewest_points: int = 10
+    #: a step in the light is seen one or two bins off only, so starts good to a third of a tenth of a radius need bins
+    #: of a thirtieth of a patch, then finer ones. Narrow, since further in a clipped rim's slope hides the albedo's
     rim: tuple[Level, ...] = (Level(30, 5.0, 3.0, 6), Level(70, 5.0, 3.0, 5), Level(None, 5.0, 3.0, 16))
+    #: bins of a fortieth of a soft patch: finer ones saw nothing but more of the albedo, in three times the time. They
+    #: hold all of the slope, which is a third of the patch
     soft: tuple[Level, ...] = (Level(30, 6.0, 2.0, 6), Level(40, 14.0, 3.0, 16))
+    #: a step this short [sigmas of uncorrelated residuals] ends a level that others follow, and the last one: what is
+    #: left is below the noise
     enough: tuple[float, float] = (1.0, 0.3)
+    #: bins without which a band is too short: eight for each parameter
     fewest_bins: int = 40
-    # the band's nuisances
+    #: where the strips' spreads of log albedo start, of levels and of slopes [1/mm]; then they are learnt. Those of a
+    #: fundus in green
     level: float = 0.3
     slope_per_mm: float = 3.0
+    #: least spread of levels, and of slopes over the band's width: an albedo even to a thousandth
     smallest: float = 1e-3
+    #: factor by which a spread may grow in one iteration
     widest: float = 5.0
+    #: relative scatter of bins beyond the sensor's noise where it starts; then it is measured
     white: float = 0.05
+    #: share of a miss below which it is taken to first order
     linear: float = 0.5
+    #: the scatter is measured on bins whose light changes with the tip's height by this share of what the steepest do
     steady: float = 0.3
+    #: longest step of the tip, in bins, and however small they are [mm]: within it an outline is nearly linear
     longest_step_bins: float = 3.0
     longest_step_mm: float = 0.1
-    # patches clipped throughout
+    #: bins across a patch that is clipped throughout, before every pixel is one
     saturated_bins: tuple[int, ...] = (30, 90)
+    #: bins on either side of the outline that are counted, iteration by iteration: many to find it, few to measure it
     reach: tuple[float, ...] = (2.0, 2.0, 1.0, 0.5, 0.4, 0.3, 0.3)
+    #: bins on either side that are looked at
     saturated_band: float = 5.0
+    #: bins on either side within which lie those between dark and white
     seam: float = 2.0
+    #: least scatter of a strip [bins]: what counting whole pixels leaves
     smallest_scatter: float = 0.02
+    #: longest step of the tip where only clipping is seen [mm]
     saturated_step_mm: float = 0.5
 
 

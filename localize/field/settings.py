@@ -1,4 +1,4 @@
-"""The tuned numbers of the soft fit."""
+"""The tuned numbers of the soft fit; `benchmarks/tuned_numbers.py field` halves and doubles each."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ class Level:
     """One level of the coarse-to-fine fit."""
 
     bins: int  #: across a patch, at most
-    iterations: int
+    iterations: int  #: at most
     tied: int  #: iterations of them that keep the axis on the RCM
 
 
@@ -18,37 +18,68 @@ class Level:
 class FieldSettings:
     """Tuned numbers of the soft fit."""
 
+    #: a soft edge loses nothing where 5000 px frames are binned 5 x 5 (1.03 of the bound); 240 bins are that, and the
+    #: coarse level brings a start there without running off
     levels: tuple[Level, ...] = (Level(48, 5, 2), Level(240, 16, 0))
+    #: of a patch's size, seen around it: where the light ends, and the albedo there
     margin: float = 0.15
+    #: longest step of the tip along a coordinate [mm]
     longest_step_mm: float = 0.15
+    #: a step this short [sigmas] ends the iterations: what is left is below the noise
     done_sigmas: float = 0.2
+    #: how well the RCM counts as known while the axis is kept on it [mm]
     tied_mm: float = 2e-3
+    #: an albedo with vessels is no Gaussian field: on fundus images, in green and at 850 nm, the squared errors of the
+    #: tip were this much larger, with the RCM and without, at 1000 and 5000 px
     not_gaussian: float = 1.7
-    # the albedo's modes
+
+    #: exponent and knee [cycles/mm] of the power spectrum of a fundus photograph's log albedo
+    #: (doi 10.15347/wjm/2014.008): measured, see `field.albedo`
     exponent: float = 2.6
     knee: float = 8.0
+    #: the spectrum's amplitude to start from, of a fundus in green and of what a reference leaves of it; then it is
+    #: learnt octave by octave
     fundus: float = 0.0025
     known: float = 1e-5
+    #: amplitudes between a uniform fundus and an optic disc
     amplitudes: tuple[float, float] = (1e-10, 1.0)
+    #: what the next finer octave says of an octave's amplitude, in modes
     shared: float = 4.0
+    #: modes a side, at most, and bins for each: a finer wave costs more than it tells. At 5000 px detail of the retina,
+    #: not the sensor, limits a soft patch, and 24 modes take it up
     most_modes: int = 24
     bins_a_mode: int = 8
+    #: prior variance of the mean log albedo, which nothing restricts
     mean_variance: float = 100.0
-    # colours
+
+    #: how much of a log ratio of channels the leading one's log albedo may hold (prior sigma)
     chroma: float = 0.5
+    #: blur of the channels before their ratio [bins], or their noise would hide what they have in common
     chroma_blur: float = 1.0
+    #: share of the median below which a bin counts as that dark, so that its logarithm is finite
     chroma_darkest: float = 0.05
-    # what the modes leave
+
+    #: rms of the albedo beyond the modes where it starts; then it is measured
     scatter: float = 0.1
+    #: share of a miss below which it is taken to first order
     linear: float = 0.3
+    #: share of the brightest light from which on a bin counts as lit where the rest is measured
     lit: float = 0.1
+    #: bins a side over which the rest is measured: about a wave of the finest modes
     near: int = 13
+    #: bins a side whose mean tells how far neighbours share their rest
     block: int = 5
+    #: bins' worth of the whole patch's rest in what is measured around one
     elsewhere: float = 20.0
+    #: least local variance of the rest, over the patch's
     least_local: float = 0.5
+    #: largest square of a bin's rest that counts: a vessel's
     largest_excess: float = 1.0
+    #: whitened rests count up to here where neighbours are compared
     largest_shared: float = 4.0
+    #: most bins that share their rest
     largest_area: float = 30.0
+    #: the rest is correlated farther than the blocks tell: on fundus images, the largest factor that costs no accuracy
     farther: float = 4.0
 
 
