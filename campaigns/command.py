@@ -106,7 +106,8 @@ def _parser() -> argparse.ArgumentParser:
     compare = add("compare", _compare, "compare two lights pose by pose, in one run or several")
     compare.add_argument("folders", type=Path, nargs="+", metavar="RUN")
     compare.add_argument("--lights", metavar="A,B", help="reference and other light (default: the first against all)")
-    add("doctor", _doctor, "say what this machine renders with, and prove it")
+    doctor = add("doctor", _doctor, "say what this machine renders with, and prove it")
+    doctor.add_argument("--clear-cache", action="store_true", help="remove the backgrounds kept between runs instead")
     return parser
 
 
@@ -236,9 +237,13 @@ def _show(options: argparse.Namespace) -> Ending:
 
 
 def _doctor(options: argparse.Namespace) -> Ending:
+    from conespot.render import kept
     from conespot.render.doctor import examine
     from conespot.render.kernel import KernelError
 
+    if options.clear_cache:
+        _say(f"removed {kept.clear() / 1e6:.0f} MB of backgrounds")
+        return Ending.DONE
     try:
         for line in examine():
             _say(line)

@@ -8,7 +8,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from conespot.render import kernel
+from conespot.render import kept, kernel
 from conespot.render.renderer import Renderer
 from conespot.scene import Camera, Scene
 from conespot.scene.beam import HardBeam
@@ -25,6 +25,7 @@ def examine() -> Iterator[str]:
     yield f"mitsuba {found.mitsuba}, drjit {found.drjit}"
     yield f"variant {found.variant} ({found.remark})"
     yield f"LLVM library {found.llvm}"
+    yield said_of_kept()
     scene = Scene(camera=Camera(resolution=500), beam=HardBeam(), retina=UniformRetina(albedo=0.1))
     pose = scene.pose(np.array([1.0, 0.5, 4.0]))
     start = time.perf_counter()
@@ -45,3 +46,12 @@ def examine() -> Iterator[str]:
     yield f"radiance at the spot's centre {seen:.2f} W/m2/sr, closed form {expected:.2f}: {verdict} ({error:+.2%})"
     if verdict != "agrees":
         raise kernel.KernelError("the rendered tile is wrong: this installation of mitsuba cannot be trusted")
+
+
+def said_of_kept() -> str:
+    """Where backgrounds are kept between runs, and how much room they take."""
+    place = kept.folder()
+    if place is None:
+        return f"backgrounds are not kept: {kept.SWITCH}=off is set, or the cache folder cannot be written"
+    count, size = kept.occupied()
+    return f"{count} backgrounds kept in {place}, {size / 1e6:.0f} MB of at most {kept.LIMIT / 1e6:.0f} MB"

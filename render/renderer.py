@@ -8,11 +8,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from conespot.render import emitters, kernel, monte_carlo, shaft, spectral
+from conespot.render import emitters, kept, kernel, monte_carlo, shaft, spectral
 from conespot.render.rim import rim_pixels
 from conespot.render.stage import Stage
 from conespot.render.tile import Crop, Tile
 from conespot.scene import Pose, Scene
+from conespot.scene.identity import digest
 from conespot.scene.illumination import Light
 from conespot.scene.spectrum import Curve
 from conespot.scene.spotlights import spotlight_axes
@@ -116,6 +117,16 @@ class Renderer:
 
     @functools.cached_property
     def _empty_background(self) -> Image:
+        """Kept on disk under all that it shows: not the instrument, nor its light."""
+        scene, (rows, columns) = self.scene, self.scene.camera.shape
+        channels = spectral.channels(scene, scene.ambient.illumination, self._responses)
+        shown = scene.model_dump(include={"eye", "camera", "surface", "retina", "ambient"})
+        films = [(channel.film.wavelengths.tolist(), channel.film.values.tolist()) for channel in channels]
+        how = (self._kernel.variant, self._kernel.llvm, self._background_samples, BACKGROUND_SEED)
+        address = digest([repr(part) for part in (shown, films, how, kept.made_by())])
+        return kept.kept(address, (rows, columns, len(channels)), self._rendered_background)
+
+    def _rendered_background(self) -> Image:
         crop = Crop.whole(self.scene.camera.shape)
         self.rendered += 1
         frame = self._ambient(with_shaft=False).render(crop, self._background_samples, BACKGROUND_SEED)

@@ -1,6 +1,11 @@
 """Settings for every test."""
 
+import os
+
 from hypothesis import settings
+
+# tests render for themselves, and leave what the user's runs have kept alone
+os.environ["CONESPOT_CACHE"] = "off"
 
 # a machine that renders beside the tests may be slow for any single example
 settings.register_profile("conespot", deadline=None)
