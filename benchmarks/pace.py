@@ -51,11 +51,13 @@ def main() -> None:
     """Print the numbers."""
     (first, few), (_, many), (_, powers) = (measured(plan_of(*args)) for args in ((16, 1), (256, 1), (16, 8)))
     group = plan_of(256, 1).groups[0]
-    rays = float(np.mean([tile_rays(group, group.pose(i), 0) for i in range(1, len(group.positions))])) * 240.0 / 256.0
+    rays = float(np.mean([tile_rays(group, group.pose(i), 0) for i in range(1, len(group.positions))])) / group.samples
     pixels = math.prod(group.scene.camera.shape)
+    a_ray, a_pixel = (many - few) / (240.0 * rays), (powers - few) / (7 * 2 * pixels)
     say = sys.stdout.write
-    say(f"rays_per_second   {rays / (many - few):.3g}\n")
-    say(f"seconds_per_pixel {(powers - few) / (7 * 2 * pixels):.3g}\n")
+    say(f"rays_per_second   {1.0 / a_ray:.3g}\n")
+    say(f"seconds_per_pixel {a_pixel:.3g}\n")
+    say(f"seconds_per_tile  {few - 16.0 * rays * a_ray - 2 * pixels * a_pixel:.3g}\n")
     say(f"seconds_per_scene {first - few:.3g}\n")
 
 

@@ -1,7 +1,7 @@
 """`cases.jsonl`: what the cases of a run are, so that whoever reads its rows need guess nothing.
 
-One JSON object a line and one line a case, in the order of the plan. Long tables of points that were read from a file
-stand as that file's name and a digest.
+One JSON object a line and one line a case, in the order of the plan. Long tables of points stand as a digest, with
+the name of the file or package that they came from.
 """
 
 from __future__ import annotations
@@ -62,12 +62,12 @@ def _plain(model: BaseModel) -> dict[str, Any]:
 
 
 def _without_points(data: Any) -> Any:
-    """Plain data with a digest in place of points that a file holds, and of that file its name alone."""
+    """Plain data with a digest in place of points that a file or another package holds; of a file its name alone."""
     if isinstance(data, list):
         return [_without_points(item) for item in data]
     if not isinstance(data, dict):
         return data
-    if data.get("points") and isinstance(data.get("file"), str):
-        kept = {key: value for key, value in data.items() if key != "points"}
-        data = {**kept, "file": Path(data["file"]).name, "digest": digest(data["points"])}
+    if data.get("points"):
+        kept = {key: Path(value).name if key == "file" else value for key, value in data.items() if key != "points"}
+        data = {**kept, "digest": digest(data["points"])}
     return {key: _without_points(value) for key, value in data.items()}

@@ -179,22 +179,12 @@ def _theory(options: argparse.Namespace) -> Ending:
 
 
 def _report(options: argparse.Namespace) -> Ending:
-    from conespot.campaigns.plan import make_plan
-    from conespot.campaigns.schema import read_campaign
-    from conespot.campaigns.store import goes_on, open_store, read_begun_with
-
-    folder: Path = options.folder
-    # the rows of a run that names its cases otherwise are taken as they are
-    if (folder / "journal.jsonl").exists() and (folder / "campaign.yaml").exists() and goes_on(read_begun_with(folder)):
-        document = read_campaign(str(folder / "campaign.yaml"))
-        plan = make_plan(document)
-        if plan.campaign.made_with.get("identity") == plan.identity:
-            with open_store(folder, plan, document) as store:
-                store.write_rows()
+    from conespot.campaigns.session import renew_rows
     from conespot.results import write_results
 
-    write_results(folder)
-    _say_results(folder)
+    renew_rows(options.folder)
+    write_results(options.folder)
+    _say_results(options.folder)
     return Ending.DONE
 
 

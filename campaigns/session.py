@@ -15,7 +15,7 @@ from conespot.campaigns.pool import LocalPool
 from conespot.campaigns.progress import Progress
 from conespot.campaigns.row import Record
 from conespot.campaigns.schema import override, read_campaign
-from conespot.campaigns.store import Store, made_with, open_store
+from conespot.campaigns.store import Store, goes_on, made_with, open_store, read_begun_with
 from conespot.scene import InputError
 from conespot.scene.atomic import write_atomically
 from conespot.scene.document import Document
@@ -77,6 +77,29 @@ def carry_out(document: Document, out: str | Path | None, executor: Executor) ->
         lost = tuple(record for record in store.records.values() if record.error)
     write_results(folder)
     return Session(folder, lost)
+
+
+def renew_rows(folder: Path) -> None:
+    """Write the rows of a run folder again from its journal.
+
+    Rows are left as they are where this installation cannot tell what the journal means: a run of another schema, one
+    whose localizers are not installed, a stranger's without a journal. Raises InputError if there are none either.
+    """
+    from conespot.results.rows import find_rows
+
+    begun = (folder / "journal.jsonl").exists() and (folder / "campaign.yaml").exists()
+    if not begun or not goes_on(read_begun_with(folder)):
+        return
+    try:
+        document = read_campaign(str(folder / "campaign.yaml"))
+        plan = make_plan(document)
+    except InputError:
+        if find_rows(folder) is None:
+            raise
+        return
+    if plan.campaign.made_with.get("identity") == plan.identity:
+        with open_store(folder, plan, document) as store:
+            store.write_rows()
 
 
 def _measure(plan: Plan, store: Store, executor: Executor) -> None:

@@ -5,7 +5,7 @@ import pytest
 
 from conespot.campaigns.ending import RunError
 from conespot.campaigns.row import Finding, Record
-from conespot.campaigns.session import run_campaign
+from conespot.campaigns.session import renew_rows, run_campaign
 from conespot.results.run import load_run
 from conespot.scene import InputError
 
@@ -90,3 +90,20 @@ def test_the_order_of_localizers_is_no_other_campaign(run, tmp_path):
     turned = AtOnce()
     assert len(rows_of(run(turned, settings={"poses": "1"}))) == 4
     assert turned.asked == []
+
+
+def test_rows_are_renewed_from_the_journal_where_it_can_be_understood_and_kept_where_not(run, tmp_path):
+    """errors.csv deleted and made again; then with a localizer that is not installed, with rows and without."""
+    folder = run(AtOnce())
+    before = (folder / "errors.csv").read_bytes()
+    (folder / "errors.csv").unlink()
+    renew_rows(folder)
+    assert (folder / "errors.csv").read_bytes() == before
+    resolved = folder / "campaign.yaml"
+    resolved.write_text(resolved.read_text().replace("[paper, paper-code]", "[paper, beacon]"))
+    renew_rows(folder)
+    assert (folder / "errors.csv").read_bytes() == before
+    for rows in folder.glob("errors.*"):
+        rows.unlink()
+    with pytest.raises(InputError, match="unknown localizer 'beacon'"):
+        renew_rows(folder)
