@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import asdict, dataclass
 
 import pandas as pd
@@ -14,6 +14,8 @@ NOT_STATED = "not stated"
 _MOST = 4
 
 Cases = Mapping[str, Case]
+#: what some rows are about: keys of cases, each with a localizer
+Pairs = Sequence[tuple[str, str]]
 
 
 @dataclass(frozen=True)
@@ -37,13 +39,17 @@ class Assumptions:
         return "; ".join(f"{key.replace('_', ' ')}: {value}" for key, value in asdict(self).items())
 
 
-def assumptions(cases: Cases, rows: pd.DataFrame) -> Assumptions:
-    """The assumption set of some rows (columns `case`, `localizer`) of a run with these cases.
+def pairs(rows: pd.DataFrame) -> Pairs:
+    """The cases of some rows, each with the localizers of its rows."""
+    return list(dict.fromkeys(zip(rows["case"], rows["localizer"], strict=True)))
 
-    Where the rows' cases differ, what each of them assumes is named. A case that is not described states nothing.
+
+def assumptions(cases: Cases, about: Pairs) -> Assumptions:
+    """The assumption set of rows about these pairs, in a run with these cases.
+
+    Where the pairs differ, what each of them assumes is named. A case that is not described states nothing.
     """
-    pairs = rows[["case", "localizer"]].drop_duplicates()
-    sets = [_of(cases.get(case), localizer).columns() for case, localizer in pairs.itertuples(index=False)]
+    sets = [_of(cases.get(case), localizer).columns() for case, localizer in about]
     return Assumptions(**{name: either(one[name] for one in sets) for name in Assumptions().columns()})
 
 
@@ -68,17 +74,16 @@ def _of(case: Case | None, localizer: str) -> Assumptions:
     )
 
 
-def watts_of(cases: Cases, rows: pd.DataFrame) -> BothConventions | None:
-    """The power of the rows' cases in both conventions; None if they do not state it, or not the same."""
-    stated = {cases[key].watts if key in cases else None for key in rows["case"].unique()}
+def watts_of(cases: Cases, about: Pairs) -> BothConventions | None:
+    """The power of these pairs' cases in both conventions; None if they do not state it, or not the same."""
+    stated = {cases[key].watts if key in cases else None for key, _ in about}
     return stated.pop() if len(stated) == 1 else None
 
 
-def power_in_words(cases: Cases, rows: pd.DataFrame) -> str:
-    """The power of the rows, which is one number of watts, in both conventions."""
-    power_w = float(rows["power_w"].iloc[0])
+def power_in_words(cases: Cases, about: Pairs, power_w: float) -> str:
+    """What `power_w`, the power of these pairs' cases as they state it, is in both conventions."""
     unknown = f"{power_w:g} W (convention not stated)"
-    return either(cases[key].watts.words if key in cases else unknown for key in rows["case"].unique())
+    return either(cases[key].watts.words if key in cases else unknown for key, _ in about)
 
 
 def either(words: Iterable[str]) -> str:

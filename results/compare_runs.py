@@ -8,7 +8,7 @@ from typing import Any
 
 import pandas as pd
 
-from conespot.results.assumptions import Cases, assumptions
+from conespot.results.assumptions import Cases, assumptions, pairs
 from conespot.results.comparison import Comparison, compare_lights
 from conespot.results.comparison_figure import comparison_figure
 from conespot.results.light_exposure import light_exposures
@@ -66,7 +66,7 @@ def _table(comparisons: Sequence[Comparison]) -> str:
 
 def _assumed(cases: Cases, rows: pd.DataFrame) -> str:
     """What the numbers of a light assume, in a line."""
-    return f"{rows['illumination'].iloc[0]} assumes: {assumptions(cases, rows).sentence()}."
+    return f"{rows['illumination'].iloc[0]} assumes: {assumptions(cases, pairs(rows)).sentence()}."
 
 
 def _text(comparisons: Sequence[Comparison], exposures: dict[str, RetinalExposure], assumed: Mapping[str, str]) -> str:

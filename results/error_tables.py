@@ -12,7 +12,7 @@ from typing import Any, NamedTuple
 
 import pandas as pd
 
-from conespot.results.assumptions import Assumptions, assumptions, power_in_words, watts_of
+from conespot.results.assumptions import Assumptions, Pairs, assumptions, pairs, power_in_words, watts_of
 from conespot.results.columns import column
 from conespot.results.paper_values import BOTH, NOTES, REFERENCE_POWER_W, STEADY_ABOVE_W, paper_value
 from conespot.results.run import Run
@@ -39,10 +39,10 @@ class Key(NamedTuple):
 
 @dataclass(frozen=True)
 class Cell:
-    """A stored box, and the cases (`case`, `localizer`, `power_w`) of the rows that it was made from."""
+    """A stored box, and which cases and localizers it is about."""
 
     box: dict[str, Any]
-    cases: pd.DataFrame
+    about: Pairs
 
 
 _Cells = dict[Key, Cell]
@@ -82,10 +82,10 @@ def cells(run: Run, boxes: pd.DataFrame) -> list[tuple[Variant, _Cells]]:
 def _cells(rows: pd.DataFrame, boxes: pd.DataFrame) -> _Cells:
     found: _Cells = {}
     for (axes, here), (_, stored) in zip(by_axes(rows), by_axes(boxes), strict=True):
-        cases = here[["case", "localizer", "power_w"]].drop_duplicates()
+        about = pairs(here)
         for box in stored.to_dict("records"):
             if box["metric"] in _METRICS:
-                found[Key(metric=box["metric"], **axes)] = Cell({str(name): v for name, v in box.items()}, cases)
+                found[Key(metric=box["metric"], **axes)] = Cell({str(name): v for name, v in box.items()}, about)
     return found
 
 
@@ -114,7 +114,7 @@ def _beside_paper(run: Run, key: Key, cell: Cell, source: str) -> _Records:
             ours = cell.box[statistic]
             compared = {"quantity": quantity, "ours": ours, "published": known, "ratio": ours / known}
             counts = {"n": cell.box["n"], "failed": cell.box["failed"]}
-            assumed = assumptions(run.cases, cell.cases).columns()
+            assumed = assumptions(run.cases, cell.about).columns()
             records.append({"source": source, **key._asdict(), **compared, **counts, **assumed})
     return records
 
@@ -141,7 +141,7 @@ def _pooled(box: Cell, helix: Cell) -> Cell:
     mean = sum(part["mean"] * part["n"] for part in parts) / n if n else math.nan
     most = max((part["max"] for part in parts), default=math.nan)
     failed = box.box["failed"] + helix.box["failed"]
-    return Cell({"mean": mean, "max": most, "n": n, "failed": failed}, pd.concat([box.cases, helix.cases]))
+    return Cell({"mean": mean, "max": most, "n": n, "failed": failed}, [*box.about, *helix.about])
 
 
 def _table_5(run: Run, variant: Variant, cells: _Cells) -> tuple[_Records, Block] | None:
@@ -179,9 +179,13 @@ def _error_block(
     names = [(quantity, name) for quantity in QUANTITIES for name in ("ours", "published", "ratio")]
     lines = tuple((*line, *(number(pair[q][k]) if q in pair else "" for q, k in names)) for line, pair in found.items())
     header = ("error", "trajectory", "spotlights", "n", "failed", "AE", "paper", "ratio", "ME", "paper", "ratio")
-    cases = pd.concat([cell.cases for cell in cells])
-    heading = f"{variant.label}, at {power_in_words(run.cases, cases)}"
-    return Block(heading, header, lines, (*notes, f"Assumes: {assumptions(run.cases, cases).sentence()}."))
+    about = _about(cells)
+    heading = f"{variant.label}, at {power_in_words(run.cases, about, records[0]['power_w'])}"
+    return Block(heading, header, lines, (*notes, f"Assumes: {assumptions(run.cases, about).sentence()}."))
+
+
+def _about(cells: Iterable[Cell]) -> Pairs:
+    return list(dict.fromkeys(pair for cell in cells for pair in cell.about))
 
 
 def _by_power(run: Run, variant: Variant, cells: _Cells) -> tuple[_Records, Block] | None:
@@ -189,13 +193,13 @@ def _by_power(run: Run, variant: Variant, cells: _Cells) -> tuple[_Records, Bloc
     records: _Records = []
     lines: dict[Key, list[str]] = {}
     for key, cell in cells.items():
-        box, watts = cell.box, watts_of(run.cases, cell.cases)
+        box, watts = cell.box, watts_of(run.cases, cell.about)
         flux = watts.flux_w if watts else math.nan
         base = cells.get(key._replace(power_w=quarter))
         relative = _ratio(box["mean"], base.box["mean"] if base else None)
         values = {name: box[name] for name in ("mean", "median", "max", "n", "failed")}
         both = {"isotropic_w": watts.isotropic_w if watts else math.nan, "flux_w": flux}
-        assumed = assumptions(run.cases, cell.cases).columns()
+        assumed = assumptions(run.cases, cell.about).columns()
         records.append({**key._asdict(), **both, **values, "mean_over_quarter_watt": relative, **assumed})
         where = key.trajectory if key.surface == "smooth" else f"{key.trajectory}, {key.surface}"
         first = [where, key.spotlights, f"{key.power_w:g}", number(1e3 * flux), str(box["n"]), str(box["failed"])]
@@ -203,10 +207,9 @@ def _by_power(run: Run, variant: Variant, cells: _Cells) -> tuple[_Records, Bloc
         line += [number(box["mean"]), number(box["max"]), number(relative)]
     errors = [text for unit in _UNITS.values() for text in (f"mean {unit}", f"max {unit}", "relative")]
     header = ("trajectory", "spotlights", "power [W]", "flux [mW]", "n", "failed", *errors)
-    cases = pd.concat([cell.cases for cell in cells.values()])
     notes = (
         f"'relative' is the mean over the mean at {STEADY_ABOVE_W} W.",
-        f"Assumes: {assumptions(run.cases, cases).sentence()}.",
+        f"Assumes: {assumptions(run.cases, _about(cells.values())).sentence()}.",
     )
     return records, Block(variant.label, header, tuple(map(tuple, lines.values())), notes)
 

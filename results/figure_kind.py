@@ -11,7 +11,7 @@ from typing import ClassVar
 import pandas as pd
 from matplotlib.figure import Figure
 
-from conespot.results.assumptions import assumptions
+from conespot.results.assumptions import assumptions, pairs
 from conespot.results.paper_values import paper_table
 from conespot.results.run import Run
 from conespot.results.variants import Variant
@@ -38,7 +38,7 @@ class Cut:
     @property
     def assumed(self) -> str:
         """Localizer and assumption set in a sentence."""
-        sentence = assumptions(self.run.cases, self.rows).sentence()
+        sentence = assumptions(self.run.cases, pairs(self.rows)).sentence()
         return f"Localizer: {self.variant.setting['localizer']}; {sentence}."
 
 

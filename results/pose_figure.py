@@ -12,7 +12,7 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.ticker import MaxNLocator
 
-from conespot.results.assumptions import power_in_words
+from conespot.results.assumptions import pairs, power_in_words
 from conespot.results.columns import TIP_ERROR, column
 from conespot.results.error_tables import reference_power
 from conespot.results.figure_kind import Cut, FigureKind
@@ -42,7 +42,7 @@ class AlongTrajectory(FigureKind):
         rows = _at_reference(cut.rows)
         failed = int((rows["status"] == "failed").sum())
         counted = f"{failed} of {len(rows)} frames failed{' (red crosses)' if failed else ''}."
-        power = power_in_words(cut.run.cases, rows)
+        power = power_in_words(cut.run.cases, pairs(rows), float(rows["power_w"].iloc[0]))
         return f"At {power}. Signed per axis; overall is their length. {counted}\n{cut.assumed}"
 
     def draw(self, cut: Cut, title: str, caption: str) -> Figure:

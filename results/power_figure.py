@@ -11,7 +11,7 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
-from conespot.results.assumptions import power_in_words
+from conespot.results.assumptions import pairs, power_in_words
 from conespot.results.columns import column
 from conespot.results.figure_kind import Cut, FigureKind
 from conespot.results.paper_values import REFERENCE_POWER_W, paper_means
@@ -44,7 +44,10 @@ class OverPower(FigureKind):
         failed, frames = int((cut.rows["status"] == "failed").sum()), len(cut.rows)
         red = " (in red: how many at each power)" if failed else ""
         powers = cut.rows["power_w"]
-        least, most = (power_in_words(cut.run.cases, cut.rows[powers == p]) for p in (powers.min(), powers.max()))
+        least, most = (
+            power_in_words(cut.run.cases, pairs(cut.rows[powers == power]), power)
+            for power in (float(powers.min()), float(powers.max()))
+        )
         counted = f"{failed} of {frames} frames failed{red}; boxes hold the others. From {least} to {most}."
         return f"{_TUKEY} {counted}\n{cut.assumed}"
 

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from conespot.results.assumptions import Assumptions, assumptions
+from conespot.results.assumptions import Assumptions, assumptions, pairs
 from conespot.results.columns import TIP_SIGMA
 from conespot.results.run import Run
 from conespot.results.table import Block, Table, number
@@ -40,7 +40,7 @@ def precision_table(run: Run) -> Table | None:
     for variant, part in split(run.rows.frame, run.rows.group):
         for axes, here in by_axes(part):
             found = precision(here)
-            assumed = assumptions(run.cases, here)
+            assumed = assumptions(run.cases, pairs(here))
             records.append({**variant.setting, **axes, **found, **assumed.columns()})
             of = sets.setdefault(assumed, [])
             if variant.label not in of:

@@ -9,7 +9,7 @@ from typing import Any
 
 import jinja2
 
-from conespot.results.assumptions import Assumptions, assumptions
+from conespot.results.assumptions import Assumptions, assumptions, pairs
 from conespot.results.columns import SETTING, column
 from conespot.results.figures import Drawing
 from conespot.results.light_exposure import light_exposures
@@ -76,7 +76,7 @@ def _facts(run: Run) -> list[tuple[str, str]]:
             values = [str(value) for value in ordered(frame[name])]
             text = f"{', '.join(values[:12])}{' ...' if len(values) > 12 else ''} {c.unit}".rstrip()
             facts.append((name.removesuffix(f"_{c.unit}"), text))
-    stated = assumptions(run.cases, frame)
+    stated = assumptions(run.cases, pairs(frame))
     facts += [("power convention", stated.power_convention), ("transfer", stated.transfer)]
     exposures = light_exposures(run).items()
     return facts + [(f"retinal exposure, {name}", exposure.sentence) for name, exposure in exposures]
@@ -128,7 +128,7 @@ def _assumption_sets(run: Run) -> Block | None:
         surfaces = ordered(part["surface"])
         for surface in surfaces:
             label = f"{variant.label}, {surface}" if len(surfaces) > 1 else variant.label
-            lines.append((label, *assumptions(run.cases, part[part["surface"] == surface]).columns().values()))
+            lines.append((label, *assumptions(run.cases, pairs(part[part["surface"] == surface])).columns().values()))
     names = (name.replace("_", " ") for name in Assumptions().columns())
     return Block("", ("numbers of", *names), tuple(lines[:_MOST_LINES]), ())
 

@@ -3,7 +3,8 @@
 import pandas as pd
 import pytest
 
-from conespot.results.assumptions import Assumptions, assumptions, power_in_words, watts_of
+from conespot.results.assumptions import Assumptions, pairs, power_in_words, watts_of
+from conespot.results.assumptions import assumptions as of_pairs
 from conespot.results.cases import Case
 from conespot.scene import Scene, load_scene
 from conespot.scene.beam import CyclesBeam, HardBeam
@@ -12,6 +13,10 @@ from conespot.scene.sensor import SENSORS
 
 def described(make_cases, frame, scene_of=None):
     return {case["key"]: Case.model_validate(case) for case in make_cases(frame, scene_of)}
+
+
+def assumptions(cases, frame):
+    return of_pairs(cases, pairs(frame))
 
 
 def scene_with(**parts):
@@ -44,10 +49,10 @@ def test_a_sweep_over_whole_beams_states_edge_convention_and_watts_of_each(make_
         rows = frame[frame["scene.beam"] == text]
         found = assumptions(cases, rows)
         assert (found.edge, found.power_convention) == (beam.words, "flux (P leaves the tip)")
-        assert watts_of(cases, rows).flux_w == pytest.approx(0.003)
-        assert "(3 mW flux)" in power_in_words(cases, rows)
+        assert watts_of(cases, pairs(rows)).flux_w == pytest.approx(0.003)
+        assert "(3 mW flux)" in power_in_words(cases, pairs(rows), 0.003)
     assert assumptions(cases, frame).edge == " or ".join(beam.words for beam in beams.values())
-    assert watts_of(cases, frame) is None
+    assert watts_of(cases, pairs(frame)) is None
 
 
 def test_bumps_are_no_smooth_eye_and_a_camera_is_more_than_its_kind(make_cases, make_rows):
@@ -64,8 +69,8 @@ def test_bumps_are_no_smooth_eye_and_a_camera_is_more_than_its_kind(make_cases, 
 def test_a_run_that_states_nothing_is_said_to(make_rows):
     frame = make_rows(poses=2, powers=(1.0,))
     assert set(assumptions({}, frame).columns().values()) == {"not stated"}
-    assert power_in_words({}, frame) == "1 W (convention not stated)"
-    assert watts_of({}, frame) is None
+    assert power_in_words({}, pairs(frame), 1.0) == "1 W (convention not stated)"
+    assert watts_of({}, pairs(frame)) is None
 
 
 def test_a_case_left_out_is_not_covered_by_the_others(make_cases, make_rows):
@@ -73,7 +78,7 @@ def test_a_case_left_out_is_not_covered_by_the_others(make_cases, make_rows):
     cases = described(make_cases, frame)
     del cases[frame["case"].iloc[0]]
     assert assumptions(cases, frame).radius == "not stated or 12.5 mm"
-    assert watts_of(cases, frame) is None
+    assert watts_of(cases, pairs(frame)) is None
 
 
 def test_a_localizer_that_the_case_does_not_know_states_nothing(make_cases, make_rows):
