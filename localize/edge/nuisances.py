@@ -43,7 +43,7 @@ class Nuisances:
             self._begin(brightness)
         albedo = self.level + self.slow @ self.strips.slow + self.strips.log_albedo(self.levels)
         model = np.exp(albedo) * brightness
-        residual, bound = log_residuals(shown, model, EDGE.linear)
+        residual, bound = log_residuals(shown, model)
         use = shown.usable | bound
         variance = self.noise.variance(model) / self.pixels / np.square(np.maximum(model, 1e-9))
         # the scatter that counts is that of the bins which hold the edge, and it tells how far the edge still is off

@@ -49,8 +49,6 @@ class EdgeSettings:
     widest: float = 5.0
     #: relative scatter of bins beyond the sensor's noise where it starts; then it is measured
     white: float = 0.05
-    #: share of a miss below which it is taken to first order
-    linear: float = 0.5
     #: the scatter is measured on bins whose light changes with the tip's height by this share of what the steepest do
     steady: float = 0.3
     #: longest step of the tip, in bins, and however small they are [mm]: within it an outline is nearly linear

@@ -96,7 +96,7 @@ class Piece:
         self._lit = full > 0.0
         brightness = bins.ambient.reshape(shape) + gain * full
         model = np.exp(plane.template + self._albedo) * brightness
-        residual, bound = log_residuals(plane, model, FIELD.linear)
+        residual, bound = log_residuals(plane, model)
         use = self._usable | (bound & self._seen)
         sensor = self._noise.variance(model) / bins.at.side**2 / np.square(np.maximum(model, 1e-9))
         sensor = sensor + plane.template_variance

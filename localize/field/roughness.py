@@ -56,4 +56,4 @@ def _shared(residuals: Array, lit: NDArray[np.bool_]) -> float:
     if len(means) < 2 * FIELD.block**2:
         return 1.0
     single = float(np.var(residuals[lit]))
-    return float(np.clip(FIELD.block**2 * np.var(means) / max(single, 1e-12), 1.0, FIELD.largest_area))
+    return max(1.0, FIELD.block**2 * float(np.var(means)) / max(single, 1e-12))

@@ -23,6 +23,9 @@ class ResidualSettings:
     #: share of the model's light below which a bin counts as that dark, so that its logarithm is finite: halved or
     #: doubled, no error changes in its third digit
     darkest: float = 0.02
+    #: share of the model's light by which a bin may miss it to be taken to first order. On soft patches 0.15, 0.3 and
+    #: 0.6 change no error by more than 4 %
+    linear: float = 0.5
     #: whitened residuals count up to here in the misfit; it means what it does together with the verdict's limit. At
     #: 2.5 the limit of 2.5 can refuse nothing, at 10 it refuses 2 of 12 good fits on hard edges
     gross: float = 5.0
@@ -37,15 +40,15 @@ class ResidualSettings:
 RESIDUAL = ResidualSettings()
 
 
-def log_residuals(shown: Shown, model: Array, linear: float) -> tuple[Array, NDArray[np.bool_]]:
+def log_residuals(shown: Shown, model: Array) -> tuple[Array, NDArray[np.bool_]]:
     """Log of the light that a channel's bins show over the `model`'s [white], and which of them are bounds only.
 
-    To first order where they agree to a share `linear`: the mean of a logarithm of noise is not that of noise. A
-    clipped bin says only that its light is above white.
+    To first order where they nearly agree: the mean of a logarithm of noise is not that of noise. A clipped bin says
+    only that its light is above white.
     """
     relative = shown.signal / model - 1.0
     log = np.log(np.maximum(shown.signal, RESIDUAL.darkest * model) / model)
-    residual = np.where(np.abs(relative) < linear, relative, log)
+    residual = np.where(np.abs(relative) < RESIDUAL.linear, relative, log)
     bound = shown.clipped & (model < 1.0)
     residual[bound] = -np.log(np.maximum(model[bound], 1e-6))
     return residual, bound
