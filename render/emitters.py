@@ -47,9 +47,10 @@ def spotlight(mi: Any, scene: Scene) -> dict[str, Any]:
 
 def _profile_texture(mi: Any, beam: BeamProfile) -> dict[str, Any]:
     """The profile over the square of tangents +-tan(half angle) that `spot` projects its texture onto."""
-    t = ((np.arange(_PROFILE) + 0.5) / _PROFILE * 2.0 - 1.0) * math.tan(beam.half_angle)
-    cos_angle = 1.0 / np.sqrt(1.0 + t[:, None] ** 2 + t[None, :] ** 2)
-    bitmap = mi.Bitmap(beam.intensity(cos_angle).astype(np.float32)[..., None])
+    # a quarter of it, which the others mirror
+    t = (np.arange(_PROFILE // 2) + 0.5) / _PROFILE * 2.0 * math.tan(beam.half_angle)
+    quarter = beam.intensity(1.0 / np.sqrt(1.0 + t[:, None] ** 2 + t[None, :] ** 2)).astype(np.float32)
+    bitmap = mi.Bitmap(np.pad(quarter, ((_PROFILE // 2, 0), (_PROFILE // 2, 0)), mode="symmetric")[..., None])
     return {"type": "bitmap", "bitmap": bitmap, "raw": True, "filter_type": "bilinear", "wrap_mode": "clamp"}
 
 

@@ -90,7 +90,7 @@ class Reflectance:
             grey = np.pad(maps.band(band, self.retina, TEXEL), border, mode="edge")
         else:
             grey = self.map
-        bitmap = mi.Bitmap(np.asarray(grey, np.float32)[..., None])
+        bitmap = mi.Bitmap(np.array(grey, np.float32)[..., None])  # Mitsuba takes no read-only one
         return {"type": "bitmap", "bitmap": bitmap, "raw": True, "filter_type": "bilinear", "wrap_mode": "clamp"}
 
     @staticmethod
@@ -99,13 +99,14 @@ class Reflectance:
         return np.stack([0.5 + arc[..., 0] / (2.0 * EXTENT), 0.5 - arc[..., 1] / (2.0 * EXTENT)], axis=-1)
 
 
+@functools.lru_cache(maxsize=2)
 def _photo_map(retina: PhotoRetina) -> NDArray[np.float32]:
     """The photograph's luminance without its uneven illumination, continued beyond its field by reflection."""
     data = np.frombuffer(resources.files("conespot.render").joinpath("data/retina.jpg").read_bytes(), np.uint8)
     photo = cv2.imdecode(data, cv2.IMREAD_COLOR)
     if photo is None:
         raise RuntimeError("render/data/retina.jpg cannot be decoded: the installation is damaged")
-    linear = srgb.decoded(photo.astype(np.float64) / np.float64(255.0))
+    linear = srgb.decoded(np.arange(256) / np.float64(255.0))[photo]
     luminance = linear @ [0.0722, 0.7152, 0.2126]  # IEC 61966-2-1, blue first as OpenCV decodes
 
     centre_x, centre_y, radius = _FIELD
@@ -128,4 +129,6 @@ def _photo_map(retina: PhotoRetina) -> NDArray[np.float32]:
     central = slice(n // 2 - 500, n // 2 + 500)  # the paper's 10 x 10 mm area of interest
     low, high = retina.contrast
     relative = np.clip(flat / flat[central, central].mean(), low, high)
-    return (retina.mean * relative / relative[central, central].mean()).astype(np.float32)
+    albedo = (retina.mean * relative / relative[central, central].mean()).astype(np.float32)
+    albedo.flags.writeable = False
+    return albedo
