@@ -12,78 +12,137 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class StartSettings:
-    """Tuned numbers of the start: rings, rays, rigs, and the search over them."""
+    """Tuned numbers of the start: rings, rays, rigs, and the search over them.
 
-    # rings
+    Lengths are pixels of the overview or of the vote, shares of a patch's radius, or mm where the name says so.
+    `campaign run gross_errors` judges them together, on eyes on which none was set: one gross error in 7,314 answers.
+    """
+
+    # Rings: the frame at a glance, and the vote of its gradients.
+
+    #: sides of the overview, about [px], and pixels of it a side of a bin of the vote; small rings need finer bins,
+    #: up to a radius of `fine_reach` bins, from where the coarse ones see them
     overview_px: int = 500
     bin_side: int = 4
     fine_bin_side: int = 2
     fine_reach: float = 8.0
+    #: what is added before the logarithm, so that noise in the dark and dark vessels count little: this share of the
+    #: frame's median, and this many sigmas of its noise
     dark_share: float = 0.5
     noise_sigmas: float = 4.0
+    #: blur before gradients are taken [bins]: with Scharr's own, gradients of the scale of a bin
     vote_blur: float = 0.7
+    #: gradient of the log light of a bin that has half a vote: a step of 12 % from one bin to the next, more than what
+    #: mottle and the camera's noise do to bins
     half_vote: float = 0.12
+    #: ratio of neighbouring radii: a ring between two of them is 9 % off one, about its own width
     radius_ratio: float = 1.2
+    #: sigma of a ring's width [bins], and as a share of its radius: patches are no circles
     ring_width: float = 0.6
     ring_width_share: float = 0.08
+    #: the smallest ring, by the tip's distance from the wall [mm], and in bins; the largest is that of a tip a radius
+    #: of the eye away
     nearest: float = 0.7
     smallest: float = 1.2
+    #: how wide the gradients along a ring that was found are taken out of the vote [bins]: both sides of a blurred rim
     hidden_width: int = 3
-    one_ring_size: float = 2.0
+    #: rings nearer than this share of the larger radius, and less than this ratio apart in size, are one
     one_ring_place: float = 0.5
-    # rays
+    one_ring_size: float = 2.0
+
+    # Rays across an outline; what follows is in units of the distance from the patch's middle to its outline.
+
+    #: rays around an outline, one every 10 deg, and of how many the frame must show enough: a quarter of the outline
     rays: int = 36
     fewest_rays: int = 9
+    #: from where to where a ray is sampled, how densely, and how many of the outer samples may lie outside the frame
     reach: tuple[float, float] = (0.5, 1.43)
     spacing: float = 0.04
     samples_missed: int = 4
+    #: by how much the outline is moved at a time, and how often to either side: a quarter of the radius, as far as a
+    #: ring of neighbouring radius and place may be off
     shift: float = 0.03
     most_shift: int = 8
+    #: up to where a sample is safely inside, and from where outside, for the contrast between the two
     inside: float = 0.7
     outside: float = 1.15
+    #: blur of what the rays see, the step of the shifts; at least so much [px of the overview], and what bilinear
+    #: sampling blurs besides (a triangle's sigma is 1 / sqrt(6) = 0.41 px); of the model's blur this is the most
     ray_blur: float = 0.03
     least_blur: float = 0.5
     sampling_blur: float = 0.4
     widest_blur: float = 0.25
+    #: share of white from which on a sample is clipped, and share of clipped samples that make a patch clipped
     white: float = 0.97
     clipped_share: float = 0.3
+    #: the contrast is never taken to be less than this log light, nor the profile inside darker than this share
     least_contrast: float = 0.05
     darkest_profile: float = 0.02
+    #: contrasts that are tried, over the one measured: of a clipped patch only the rim is seen, so that it may be
+    #: brighter by any factor; where other things are bright, what lies inside and outside the outline says little
     clipped_contrasts: tuple[float, ...] = (1.0, 4.0, 16.0, 64.0)
     doubted_contrasts: tuple[float, ...] = (0.06, 0.12, 0.25, 0.5, 1.0, 2.0)
+    #: a patch over its surroundings, for where its soft rim seems to be; only the logarithm matters
     rim_contrast: float = 30.0
-    # rigs
+
+    # Rigs: the patches of several spotlights on the rings.
+
+    #: rolls that are tried, one every 10 deg, and how far two must be apart to count as two [rad]: less than the
+    #: 2 pi / 6 between the spotlights of the largest rig the designs have
     rolls: int = 36
+    turned: float = 0.6
+    #: rounds in which a ring's pose and the axis of its spotlight are brought together
     rig_steps: int = 3
+    #: what a ratio of e between the radii of ring and patch counts as, as a distance in radii, and the distance at
+    #: which a patch counts as not found
     size_weight: float = 0.5
     matched: float = 0.8
-    turned: float = 0.6
+    #: share of the RCM's distance that a tip may be away from its patch: it is below the RCM
     farthest: float = 0.95
-    # search
+
+    # The search.
+
+    #: rings that are followed, and how many more for each spotlight of a rig
     most_rings: int = 6
     rings_per_spotlight: int = 2
+    #: share of the best ring's votes with which another may be the patch, if it is this many radii apart
     rival_votes: float = 0.85
     rival_distance: float = 0.7
+    #: steps from a ring's pose to that of the outline the rays see, and below which a step is the last
     turns: int = 4
-    ray_worth: float = 0.2
-    fewest_points: int = 8
-    outline_error: float = 0.01
-    longest_step: float = 0.4
     still_mm: float = 0.01
     still_rad: float = 1e-3
+    #: share of a ray's gradients that must say where the outline is, and how many rays must say so: as many as a rig's
+    #: pose has parameters, and a few
+    ray_worth: float = 0.2
+    fewest_points: int = 8
+    #: scatter of the rays' outline that is always granted, a third of their step, and the longest step of the tip over
+    #: its distance from the wall
+    outline_error: float = 0.01
+    longest_step: float = 0.4
+    #: share explained of one spotlight's outline below which it is not there
     dark: float = 0.05
+    #: a ring whose outline is within `same` of a start that explains more than `solid` is not followed once more
     solid: float = 0.5
     same: float = 0.3
+    #: starts or answers nearer than this are one [mm, rad]: 0.2 rad is two of the rolls tried
     apart_mm: float = 0.1
     apart_rad: float = 0.2
+    #: share of the gradients that a patch explains where nothing else is bright; a disc may explain nearly as much
     convincing: float = 0.6
+    #: what crosses a rim hides it on some rays only: a quarter of them must see more of the beam's edge than of all
+    #: else, so more than half
     clear: float = 0.52
-    least_share: float = 0.25
+    #: log light that all rays together must see in the mean, and the share of it: the retina's own mottle stays below
     faintest: float = 0.3
+    least_share: float = 0.25
+    #: share of the best start's evidence with which another one may be right: after a convincing one, and otherwise
+    #: where the two touch, so that each hides part of the other's outline, or lie apart; and how many are fitted
     as_good: float = 0.8
     touching: float = 0.25
     apart: float = 0.5
     most_starts: int = 3
+    #: of a patch's radius within which a fit stays near its start, which is good to a third of it
     near: float = 0.1
 
     @property
