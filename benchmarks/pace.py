@@ -57,7 +57,6 @@ def main() -> None:
     say = sys.stdout.write
     say(f"rays_per_second   {1.0 / a_ray:.3g}\n")
     say(f"seconds_per_pixel {a_pixel:.3g}\n")
-    say(f"seconds_per_tile  {few - 16.0 * rays * a_ray - 2 * pixels * a_pixel:.3g}\n")
     say(f"seconds_per_scene {first - few:.3g}\n")
 
 
