@@ -80,7 +80,7 @@ def cases() -> Iterator[Case]:
             yield Case("faint, reference", faint, scene, pose, unlit)
             eight = scene.model_copy(update={"sensor": Srgb8()})
             yield Case("clipped", eight_bits(taken(scene, pose, colour, rng, 2000.0)), eight, pose)
-            side = scene.pose(np.array([*(4.6 * np.sign(tip[:2])), 3.0]))
+            side = scene.pose(np.array([6.2, 0.5 * tip[1], 5.0]))
             yield Case("cut by the frame", twelve_bits(taken(scene, side, colour, rng, USUAL)), scene, side)
             disc, rcm = disc_of(colour, scene), np.asarray(scene.instrument.rcm)
             over = Pose.through(disc + 3.5 * (rcm - disc) / np.linalg.norm(rcm - disc), rcm)
