@@ -17,7 +17,7 @@ class StartSettings:
     Lengths are pixels of the overview or of the vote, shares of a patch's radius, or mm where the name says so.
     `campaign run gross_errors` judges them together, on eyes on which none was set: one gross error in 7,314 answers.
     `python benchmarks/tuned_start.py` halves and doubles each. Where that was done, the right starts won or lost among
-    42 lit frames, 12 of them faint, stand behind the number: as they are, 35 have the right start and 2 wrong ones are
+    42 lit frames, 18 of them faint, stand behind the number: as they are, 35 have the right start and 2 wrong ones are
     put to the fit. The others have been tried by no more than the campaign.
     """
 
@@ -25,7 +25,7 @@ class StartSettings:
 
     #: sides of the overview, about [px], and pixels of it a side of a bin of the vote; small rings need finer bins,
     #: up to a radius of `fine_reach` bins, from where the coarse ones see them
-    overview_px: int = 500  # half -6, twice +5 in four times the time
+    overview_px: int = 500  # half -6, twice +5 of four times the pixels
     bin_side: int = 4
     fine_bin_side: int = 2
     fine_reach: float = 8.0  # half +1, twice +2
@@ -60,7 +60,7 @@ class StartSettings:
     #: from where to where a ray is sampled, how densely, and how many of the outer samples may lie outside the frame
     reach: tuple[float, float] = (0.5, 1.43)
     spacing: float = 0.04  # half -2, twice +3 and one wrong one more
-    samples_missed: int = 4  # half 0, twice 0, on frames that cut the patch
+    samples_missed: int = 4  # half 0, twice 0, of 2 frames that cut the patch
     #: by how much the outline is moved at a time, and how often to either side: a quarter of the radius, as far as a
     #: ring of neighbouring radius and place may be off
     shift: float = 0.03
