@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import math
-from typing import Any, assert_never
+from types import ModuleType
+from typing import TYPE_CHECKING, assert_never
 
 import numpy as np
 
@@ -13,13 +14,16 @@ from conespot.scene.beam import BeamProfile, CyclesBeam, HardBeam, LinearBeam, T
 from conespot.scene.pose import Array
 from conespot.scene.power import Power
 
+if TYPE_CHECKING:
+    from mitsuba import ScalarTransform4f
+
 #: lengths are mm: an intensity [W/sr] over a distance squared [mm2] is an irradiance a million times too small
 _PER_M2 = 1e6
 #: side of the beam profile's texture: bilinear lookup then follows a smoothstep to 1.5e-6 of the axial intensity
 _PROFILE = 2048
 
 
-def spotlight(mi: Any, scene: Scene) -> dict[str, Any]:
+def spotlight(mi: ModuleType, scene: Scene) -> dict[str, object]:
     """The `spot` emitter with the scene's beam profile and the axial intensity of 1 W, for radiances in W m-2 sr-1.
 
     Mitsuba's own falloff is linear in the angle. Any other profile is the emitter's texture, cut off at the half
@@ -45,7 +49,7 @@ def spotlight(mi: Any, scene: Scene) -> dict[str, Any]:
             assert_never(unknown)
 
 
-def _profile_texture(mi: Any, beam: BeamProfile) -> dict[str, Any]:
+def _profile_texture(mi: ModuleType, beam: BeamProfile) -> dict[str, object]:
     """The profile over the square of tangents +-tan(half angle) that `spot` projects its texture onto."""
     # a quarter of it, which the others mirror
     t = (np.arange(_PROFILE // 2) + 0.5) / _PROFILE * 2.0 * math.tan(beam.half_angle)
@@ -54,13 +58,13 @@ def _profile_texture(mi: Any, beam: BeamProfile) -> dict[str, Any]:
     return {"type": "bitmap", "bitmap": bitmap, "raw": True, "filter_type": "bilinear", "wrap_mode": "clamp"}
 
 
-def aim(mi: Any, apex: Array, axis: Array) -> Any:
+def aim(mi: ModuleType, apex: Array, axis: Array) -> ScalarTransform4f:
     """The emitter-to-world transform of a spotlight at `apex` `[3]` [mm] along the unit `axis` `[3]`."""
     up = np.eye(3)[np.argmin(np.abs(axis))]
     return mi.ScalarTransform4f().look_at(origin=apex.tolist(), target=(apex + axis).tolist(), up=up.tolist())
 
 
-def ambient(scene: Scene) -> dict[str, Any]:
+def ambient(scene: Scene) -> dict[str, object]:
     """The microscope's light: a collimated emitter with the stated irradiance [W/m2] across its beam."""
     light = scene.ambient
     irradiance = spectral.emission(scene, light.illumination, light.irradiance, fundus.VITREOUS_LENGTH)

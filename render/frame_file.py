@@ -67,7 +67,7 @@ def write_frame(path: Path, radiance: NDArray[np.float32], header: Mapping[str, 
     channels = {name: np.ascontiguousarray(radiance[..., i]) for i, name in enumerate(names)}
     # OpenEXR writes to a path only, so the file is made beside its place and renamed
     temporary = path.with_name(f".{secrets.token_hex(4)}.exr")
-    attributes: dict[str, Any] = {"compression": OpenEXR.ZIP_COMPRESSION, "type": OpenEXR.scanlineimage, **header}
+    attributes: dict[str, object] = {"compression": OpenEXR.ZIP_COMPRESSION, "type": OpenEXR.scanlineimage, **header}
     try:
         with OpenEXR.File(attributes, channels) as file:
             file.write(str(temporary))
@@ -77,7 +77,7 @@ def write_frame(path: Path, radiance: NDArray[np.float32], header: Mapping[str, 
         raise InputError(f"{path}: cannot be written: {error}") from None
 
 
-def read_frame(path: Path) -> tuple[NDArray[np.float32], dict[str, Any]]:
+def read_frame(path: Path) -> tuple[NDArray[np.float32], dict[str, object]]:
     """Radiance `[H, W, C]` and the header of a frame. Raises InputError if the file is no such frame."""
     import OpenEXR
 

@@ -7,7 +7,7 @@ call Python for every sample, uses maps averaged over each channel's band instea
 from __future__ import annotations
 
 import math
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,18 +17,21 @@ from conespot.render.fundus_maps import TILE, FundusMaps
 from conespot.scene import fundus
 from conespot.scene.retina import Fundus
 
+if TYPE_CHECKING:
+    from mitsuba import Bool, Float, Properties, SurfaceInteraction3f, Texture, UnpolarizedSpectrum
+
 #: wavelengths of the tables [nm]
 _LOW, _HIGH = 300.0, 1100.0
 _LN10 = math.log(10.0)
 
 
-def fundus_texture(mi: Any, dr: Any, maps: FundusMaps, retina: Fundus, extent: float) -> Any:
+def fundus_texture(mi: Any, dr: Any, maps: FundusMaps, retina: Fundus, extent: float) -> Texture:
     """A Mitsuba texture whose coordinates run over +-`extent` mm of arc, v downwards; for JIT variants."""
 
     class FundusTexture(mi.Texture):  # type: ignore[misc]
         """R(wavelength, u, v) of `scene.fundus` with parameters from maps."""
 
-        def __init__(self, properties: Any) -> None:
+        def __init__(self, properties: Properties) -> None:
             super().__init__(properties)
             clamp = {"filter_mode": dr.FilterMode.Linear, "wrap_mode": dr.WrapMode.Clamp, "use_accel": False}
             layers = np.stack([maps.melanin, maps.blood, maps.epithelium, maps.macular, maps.disc], axis=-1)
@@ -40,7 +43,7 @@ def fundus_texture(mi: Any, dr: Any, maps: FundusMaps, retina: Fundus, extent: f
             self.spectra = mi.Texture1f(mi.TensorXf(_spectra(retina)), **clamp)
             self.typical = float(np.mean(maps.reflectance(650.0, retina, 0.08)))
 
-        def eval(self, si: Any, active: Any = True) -> Any:
+        def eval(self, si: SurfaceInteraction3f, active: Bool | bool = True) -> UnpolarizedSpectrum:
             """Reflectance at the four wavelengths of `si`."""
             centred = mi.Point2f(si.uv.x - 0.5, si.uv.y - 0.5) * (2.0 * extent)  # arc [mm], y downwards
             uv = mi.Point2f(0.5 + centred.x / (2.0 * EXTENT), 0.5 + centred.y / (2.0 * EXTENT))
@@ -59,7 +62,7 @@ def fundus_texture(mi: Any, dr: Any, maps: FundusMaps, retina: Fundus, extent: f
                 result[i] = surface
             return result & active
 
-        def mean(self) -> Any:
+        def mean(self) -> Float:
             """Something like the mean reflectance; Mitsuba only weighs lobes with it."""
             return mi.Float(self.typical)
 

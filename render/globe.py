@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import math
-from typing import Any, assert_never
+from types import ModuleType
+from typing import TYPE_CHECKING, assert_never
 
 import numpy as np
 
@@ -12,11 +13,14 @@ from conespot.scene import Eye, Scene
 from conespot.scene.eye import Globe
 from conespot.scene.retina import Fundus, FundusSite, PhotoRetina, UniformRetina
 
+if TYPE_CHECKING:
+    from mitsuba import ScalarTransform4f
+
 #: the wall lies this far outside the retina's mesh, relative to the radius, so that the mesh is what light meets
 _BEHIND = 2e-4
 
 
-def globe_shapes(mi: Any, scene: Scene, globe: Globe) -> dict[str, Any]:
+def globe_shapes(mi: ModuleType, scene: Scene, globe: Globe) -> dict[str, object]:
     """The wall as a sphere seen from inside, and the pupil as a black disc in front of it."""
     eye = scene.eye
     wall = {
@@ -32,7 +36,7 @@ def globe_shapes(mi: Any, scene: Scene, globe: Globe) -> dict[str, Any]:
     return {"wall": wall, "pupil": {"type": "disk", "to_world": _pupil_to_world(mi, eye, globe), "bsdf": black}}
 
 
-def _pupil_to_world(mi: Any, eye: Eye, globe: Globe) -> Any:
+def _pupil_to_world(mi: ModuleType, eye: Eye, globe: Globe) -> ScalarTransform4f:
     """Where the pupil's disc stands: as high as a sphere's cap of its width, facing the retina."""
     half = min(globe.pupil / 2.0, 0.95 * eye.radius)
     height = eye.radius + math.sqrt(eye.radius**2 - half**2)
@@ -56,7 +60,7 @@ def near_plane(scene: Scene) -> float:
     return float(camera.height - 0.95 * top)
 
 
-def _wall(scene: Scene) -> dict[str, Any]:
+def _wall(scene: Scene) -> dict[str, object]:
     match scene.retina:
         case UniformRetina(albedo=albedo) | PhotoRetina(mean=albedo):
             return {"type": "uniform", "value": albedo}

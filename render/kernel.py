@@ -14,7 +14,7 @@ import sys
 import warnings
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from types import ModuleType
 
 #: LLVM 14 to 16 abort the whole process on the spectral variants ("Cannot select: fmaximum"); 19 works
 MINIMUM_LLVM = 19
@@ -96,7 +96,7 @@ def _system_libraries() -> list[Path]:
 
 
 @functools.cache
-def load() -> tuple[Any, Any, Kernel]:
+def load() -> tuple[ModuleType, ModuleType, Kernel]:
     """Mitsuba, Dr.Jit and what was chosen: CUDA, else LLVM, else scalar (about 9 times slower), always spectral.
 
     The fall-back to scalar warns in one line. Raises KernelError for a wrong Mitsuba version or an unknown variant.
@@ -107,8 +107,8 @@ def load() -> tuple[Any, Any, Kernel]:
     import drjit
     import mitsuba
 
-    dr: Any = drjit
-    mi: Any = mitsuba
+    dr: ModuleType = drjit
+    mi: ModuleType = mitsuba
 
     if not mi.__version__.startswith(MITSUBA):
         raise KernelError(

@@ -8,7 +8,8 @@ from __future__ import annotations
 
 import functools
 from importlib import resources
-from typing import Any
+from types import ModuleType
+from typing import TYPE_CHECKING, assert_never
 
 import cv2
 import numpy as np
@@ -21,6 +22,9 @@ from conespot.render.fundus_texture import fundus_texture
 from conespot.scene import srgb
 from conespot.scene.retina import Fundus, FundusSite, PhotoRetina, Retina, UniformRetina
 from conespot.scene.spectrum import Curve
+
+if TYPE_CHECKING:
+    from mitsuba import Texture
 
 #: side of a texel [mm]: the photograph shows 14 mm on 1411 px
 TEXEL = 0.01
@@ -49,23 +53,27 @@ class Reflectance:
 
         Raises TypeError for a spectral retina, which has none.
         """
-        if isinstance(self.retina, UniformRetina):
-            return np.full((2, 2), self.retina.albedo, np.float32)
-        if isinstance(self.retina, PhotoRetina):
-            return _photo_map(self.retina)
-        raise TypeError("a spectral retina has no grey albedo")
+        match self.retina:
+            case UniformRetina(albedo=albedo):
+                return np.full((2, 2), albedo, np.float32)
+            case PhotoRetina() as photo:
+                return _photo_map(photo)
+            case FundusSite() | Fundus():
+                raise TypeError("a spectral retina has no grey albedo")
+            case unknown:
+                assert_never(unknown)
 
     @property
     def is_grey(self) -> bool:
         """Whether all wavelengths are reflected alike."""
-        return isinstance(self.retina, (UniformRetina, PhotoRetina))
+        return not self.retina.is_spectral
 
     @property
     def is_even(self) -> bool:
         """Whether it is the same everywhere."""
         return isinstance(self.retina, (UniformRetina, FundusSite))
 
-    def bsdf(self, mi: Any, texture: Any) -> dict[str, Any]:
+    def bsdf(self, mi: ModuleType, texture: Texture | dict[str, object]) -> dict[str, object]:
         """The Mitsuba BSDF: Lambertian, under a dielectric coat where the retina has a glint."""
         glint = self.retina.glint if isinstance(self.retina, Fundus) else None
         if glint is None:
@@ -73,23 +81,26 @@ class Reflectance:
         coat = {"int_ior": glint.index, "ext_ior": VITREOUS_INDEX, "alpha": glint.roughness, "distribution": "ggx"}
         return {"type": "roughplastic", "diffuse_reflectance": texture, **coat}
 
-    def texture(self, mi: Any, dr: Any, band: Curve | None = None) -> Any:
+    def texture(self, mi: ModuleType, dr: ModuleType, band: Curve | None = None) -> Texture | dict[str, object]:
         """The Mitsuba texture, over the texture coordinates that `texture_coordinates` gives.
 
         `band`: for the scalar variant, the weight over which a spectral map is averaged.
         """
-        if isinstance(self.retina, UniformRetina):
-            return {"type": "uniform", "value": self.retina.albedo}
-        if isinstance(self.retina, FundusSite):
-            return spectral.reflectance_spectrum(self.retina.site)
-        if isinstance(self.retina, Fundus):
-            maps = fundus_maps(self.retina)
-            if band is None:
-                return fundus_texture(mi, dr, maps, self.retina, EXTENT)
-            border = round((EXTENT - MAP_EXTENT) / TEXEL)
-            grey = np.pad(maps.band(band, self.retina, TEXEL), border, mode="edge")
-        else:
-            grey = self.map
+        match self.retina:
+            case UniformRetina(albedo=albedo):
+                return {"type": "uniform", "value": albedo}
+            case FundusSite(site=site):
+                return spectral.reflectance_spectrum(site)
+            case Fundus() as retina:
+                maps = fundus_maps(retina)
+                if band is None:
+                    return fundus_texture(mi, dr, maps, retina, EXTENT)
+                border = round((EXTENT - MAP_EXTENT) / TEXEL)
+                grey = np.pad(maps.band(band, retina, TEXEL), border, mode="edge")
+            case PhotoRetina():
+                grey = self.map
+            case unknown:
+                assert_never(unknown)
         bitmap = mi.Bitmap(np.array(grey, np.float32)[..., None])  # Mitsuba takes no read-only one
         return {"type": "bitmap", "bitmap": bitmap, "raw": True, "filter_type": "bilinear", "wrap_mode": "clamp"}
 

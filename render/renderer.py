@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import functools
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -144,7 +143,7 @@ class Renderer:
         return self._stage(emitter, self.scene.ambient.illumination, samples, with_shaft, like=self._lit)
 
     def _stage(
-        self, emitter: dict[str, Any], light: Light, samples: int, with_shaft: bool, like: Stage | None = None
+        self, emitter: dict[str, object], light: Light, samples: int, with_shaft: bool, like: Stage | None = None
     ) -> Stage:
         """The spotlights' stage, or one `like` it in ambient light, which sees no interreflection."""
         return Stage(

@@ -3,13 +3,17 @@
 from __future__ import annotations
 
 import math
-from typing import Any
+from types import ModuleType
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
 from conespot.render.reflectance import Reflectance
 from conespot.scene import Scene
+
+if TYPE_CHECKING:
+    from mitsuba import BSDF, Mesh
 
 #: of neighbouring vertices [mm]: chords depart from the sphere by 10 nm, from the paper's bumps by up to 1.7 um
 VERTEX_SPACING = 0.03
@@ -39,7 +43,7 @@ def from_arc(scene: Scene, arc: NDArray[np.float64]) -> NDArray[np.float64]:
     return np.concatenate([sideways, -np.cos(angle)[..., None]], axis=-1)
 
 
-def retina_mesh(mi: Any, scene: Scene, bsdf: Any) -> Any:
+def retina_mesh(mi: ModuleType, scene: Scene, bsdf: BSDF) -> Mesh:
     """The Mitsuba mesh of the visible retina: on the surface, with its exact normals."""
     extent = arc_extent(scene)
     n = math.ceil(2.0 * extent / VERTEX_SPACING) + 1

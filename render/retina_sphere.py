@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from conespot.render.reflectance import EXTENT
 from conespot.scene import Eye
 
+if TYPE_CHECKING:
+    from mitsuba import Bool, Float, Properties, SurfaceInteraction3f, Texture, UnpolarizedSpectrum
 
-def retina_sphere(eye: Eye, bsdf: Any) -> dict[str, Any]:
+
+def retina_sphere(eye: Eye, bsdf: dict[str, object]) -> dict[str, object]:
     """The whole sphere, seen from inside: the camera needs a near plane that lets it see past the upper half."""
     return {
         "type": "sphere",
@@ -19,19 +22,19 @@ def retina_sphere(eye: Eye, bsdf: Any) -> dict[str, Any]:
     }
 
 
-def on_sphere(mi: Any, dr: Any, texture: Any, eye: Eye) -> Any:
+def on_sphere(mi: Any, dr: Any, texture: Texture | dict[str, object], eye: Eye) -> Texture:
     """A texture over arc coordinates (see reflectance.py) for the eye's sphere, whose own coordinates are polar."""
     centre = eye.centre.tolist()
-    inner = mi.load_dict(texture) if isinstance(texture, dict) else texture
+    inner: Any = mi.load_dict(texture) if isinstance(texture, dict) else texture
 
     class OnSphere(mi.Texture):  # type: ignore[misc]
         """The inner texture at the arc coordinates of the place on the sphere."""
 
-        def __init__(self, properties: Any) -> None:
+        def __init__(self, properties: Properties) -> None:
             super().__init__(properties)
             self.inner = inner
 
-        def eval(self, si: Any, active: Any = True) -> Any:
+        def eval(self, si: SurfaceInteraction3f, active: Bool | bool = True) -> UnpolarizedSpectrum:
             """Reflectance at the four wavelengths of `si`."""
             direction = (si.p - mi.Point3f(centre)) / eye.radius
             rho = dr.sqrt(dr.square(direction.x) + dr.square(direction.y))
@@ -41,7 +44,7 @@ def on_sphere(mi: Any, dr: Any, texture: Any, eye: Eye) -> Any:
             there.uv = mi.Point2f(0.5 + stretch * direction.x, 0.5 - stretch * direction.y)
             return self.inner.eval(there, active)
 
-        def mean(self) -> Any:
+        def mean(self) -> Float:
             """The inner texture's; Mitsuba only weighs lobes with it."""
             return self.inner.mean()
 

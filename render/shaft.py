@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from typing import Any
+from types import ModuleType
 
 import numpy as np
 
@@ -13,7 +13,7 @@ from conespot.scene.pose import Array
 from conespot.scene.spotlights import Shaft
 
 
-def shaft_shapes(mi: Any, shaft: Shaft) -> dict[str, Any]:
+def shaft_shapes(mi: ModuleType, shaft: Shaft) -> dict[str, object]:
     """An open cylinder and the cap that faces the retina, to be placed by `placed`."""
     bsdf = {"type": "twosided", "bsdf": {"type": "diffuse", "reflectance": {"type": "uniform", "value": shaft.albedo}}}
     return {
@@ -22,7 +22,7 @@ def shaft_shapes(mi: Any, shaft: Shaft) -> dict[str, Any]:
     }
 
 
-def placed(mi: Any, shaft: Shaft, pose: Pose) -> dict[str, Any]:
+def placed(mi: ModuleType, shaft: Shaft, pose: Pose) -> dict[str, object]:
     """Parameters that move the shapes of `shaft_shapes` to a pose."""
     end, far = _ends(shaft, pose)
     radius = shaft.diameter / 2.0

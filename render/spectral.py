@@ -6,8 +6,9 @@ wavelengths are sampled, a grey retina renders without any spectral noise.
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass
-from typing import Any, assert_never
+from typing import assert_never
 
 import numpy as np
 
@@ -63,7 +64,7 @@ def channels(scene: Scene, light: Light, responses: dict[str, Curve] | None = No
     return tuple(found)
 
 
-def emission(scene: Scene, light: Light, total: float, water_mm: float) -> dict[str, Any]:
+def emission(scene: Scene, light: Light, total: float, water_mm: float) -> dict[str, object]:
     """What an emitter radiates, the film having the light's spectrum: the same at all wavelengths.
 
     In a living eye `water_mm` of vitreous between the light and the retina absorb some.
@@ -81,7 +82,7 @@ def emitted(light: Light, total: float, water_mm: float) -> list[float]:
     return [float(v) for v in total * fundus.water_transmission(x, water_mm)]
 
 
-def film_spectrum(curve: Curve) -> dict[str, Any]:
+def film_spectrum(curve: Curve) -> dict[str, object]:
     """A film's response for Mitsuba: the curve itself, or with many points an even grid of the same integral."""
     if len(curve.wavelengths) <= _FEW_POINTS:
         return {"type": "irregular", "wavelengths": _written(curve.wavelengths), "values": _written(curve.values)}
@@ -93,11 +94,11 @@ def film_spectrum(curve: Curve) -> dict[str, Any]:
     return {"type": "regular", "wavelength_min": curve.low, "wavelength_max": curve.high, "values": _written(values)}
 
 
-def reflectance_spectrum(site: str) -> dict[str, Any]:
+def reflectance_spectrum(site: str) -> dict[str, object]:
     """A site of the fundus as a regular spectrum at whole nanometres."""
     values = fundus.reflectance(np.arange(300.0, 1101.0), fundus.SITES[site])
     return {"type": "regular", "wavelength_min": 300.0, "wavelength_max": 1100.0, "values": _written(values)}
 
 
-def _written(values: Any) -> str:
+def _written(values: Iterable[float]) -> str:
     return ", ".join(repr(float(v)) for v in values)

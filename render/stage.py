@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from typing import Any
+from types import ModuleType
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,6 +18,10 @@ from conespot.render.tile import Crop
 from conespot.scene import Scene
 from conespot.scene.illumination import Light
 from conespot.scene.spectrum import Curve
+
+if TYPE_CHECKING:
+    from mitsuba import Scene as MitsubaScene
+    from mitsuba import Shape
 
 Image = NDArray[np.float32]
 
@@ -34,11 +39,11 @@ class Stage:
     def __init__(
         self,
         scene: Scene,
-        emitter: Mapping[str, Any],
+        emitter: Mapping[str, object],
         light: Light,
         *,
         samples: int,
-        shapes: Mapping[str, Any],
+        shapes: Mapping[str, object],
         responses: dict[str, Curve] | None = None,
         closed: bool = False,
         like: Stage | None = None,
@@ -55,8 +60,8 @@ class Stage:
         self._seen = [i for i, channel in enumerate(channels) if channel.film.integral() > 0.0]
         grey = [channels[i].film.integral() for i in self._seen]
         self._grey = grey if self._reflectance.is_grey else None
-        self._scenes = []
-        self.retina: Any = None
+        self._scenes: list[MitsubaScene] = []
+        self.retina: Shape | None = None
         walls = scene.interreflection if closed else None
         self.transport: wavefront.Transport = "path" if walls is not None else "direct"
         if self._vectorized and walls is None and scene.surface.is_sphere and not shapes:
@@ -68,7 +73,7 @@ class Stage:
                 self.retina = self._retina(scene, group[0].film if apart else None)
             else:
                 self.retina = like.retina
-            integrator: dict[str, Any] = {"type": "direct", "emitter_samples": 1, "bsdf_samples": 0}
+            integrator: dict[str, object] = {"type": "direct", "emitter_samples": 1, "bsdf_samples": 0}
             everything = {"retina": self.retina, "light": dict(emitter), **shapes}
             if walls is not None:
                 everything.update(globe.globe_shapes(mi, scene, walls))
@@ -86,7 +91,7 @@ class Stage:
         """Whether `halves` tells how noisy a rendering is: light reflected once in a JIT variant."""
         return self._vectorized and self.transport != "path"
 
-    def _retina(self, scene: Scene, band: Curve | None) -> Any:
+    def _retina(self, scene: Scene, band: Curve | None) -> Shape:
         """The Mitsuba shape: a sphere where it may be one, else a mesh."""
         mi, dr, _ = kernel.load()
         texture = self._reflectance.texture(mi, dr, band)
@@ -96,7 +101,7 @@ class Stage:
             texture = on_sphere(mi, dr, texture, scene.eye)
         return mi.load_dict(retina_sphere(scene.eye, self._reflectance.bsdf(mi, texture)))
 
-    def update(self, values: Mapping[str, Any]) -> None:
+    def update(self, values: Mapping[str, object]) -> None:
         """Set parameters of the Mitsuba scene; they take effect with the next rendering."""
         for parameters in self._parameters:
             for key, value in values.items():
@@ -164,7 +169,9 @@ class Stage:
         return np.concatenate(values)[np.argsort(np.concatenate(places))]
 
 
-def _sensor(mi: Any, scene: Scene, channels: list[spectral.Channel], samples: int, near: float) -> dict[str, Any]:
+def _sensor(
+    mi: ModuleType, scene: Scene, channels: list[spectral.Channel], samples: int, near: float
+) -> dict[str, object]:
     camera = scene.camera
     # Mitsuba orders the channels by their keys
     responses = {f"channel_{i:02d}": spectral.film_spectrum(channel.film) for i, channel in enumerate(channels)}

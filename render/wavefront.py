@@ -3,12 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any, Literal, assert_never
+from typing import TYPE_CHECKING, Any, Literal, assert_never, cast
 
 import numpy as np
 from numpy.typing import NDArray
 
 from conespot.render import kernel
+
+if TYPE_CHECKING:
+    from drjit.auto.ad import Bool
+    from mitsuba import RayDifferential3f, SamplingIntegrator, Scene, Spectrum
 
 #: how light comes to what the camera sees: from the emitter, which nothing can hide; from the emitter, unless something
 #: does; or by the integrator's paths
@@ -16,7 +20,7 @@ Transport = Literal["unblocked", "direct", "path"]
 
 
 def trace(
-    loaded: Any,
+    loaded: Scene,
     pixels: NDArray[np.uint32],
     width: int,
     samples: int,
@@ -64,7 +68,8 @@ def trace(
         case "path":
             bounces = mi.load_dict({"type": "independent"})
             bounces.seed(seed, len(pixels) * samples)
-            light, met, _ = loaded.integrator().sample(loaded, bounces, ray)
+            paths = cast("SamplingIntegrator", loaded.integrator())
+            light, met, _ = paths.sample(loaded, bounces, ray)
         case _:
             assert_never(transport)
     if grey is None:
@@ -78,7 +83,7 @@ def trace(
     return means.reshape(-1, 2, len(values)) if halves else means
 
 
-def _lit(loaded: Any, ray: Any, shadows: bool) -> tuple[Any, Any]:
+def _lit(loaded: Any, ray: RayDifferential3f, shadows: bool) -> tuple[Spectrum, Bool]:
     """What the scene's one emitter, a point or a direction, sends back along rays, and which of them meet anything.
 
     Mitsuba's `direct` integrator does the same, and weighs it against light that BSDF samples would find: here none.

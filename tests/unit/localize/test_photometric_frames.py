@@ -8,7 +8,6 @@ import numpy as np
 import pytest
 
 from conespot.localize import Knowns, Localization, Reference, SensorNoise, locate
-from conespot.localize.calibration import NAMES, calibrate
 from conespot.localize.sequence import locate_sequence
 from conespot.localize.theory.bounds import cramer_rao
 from conespot.scene import InputError, Pose
@@ -19,7 +18,11 @@ from conespot.scene.sensor import Linear
 from conespot.scene.spotlights import spotlight_axes
 
 PEAK, AMBIENT, READ = 9000.0, 200.0, 15.0
+
+
 WHITE = 1.25 * PEAK
+
+
 NOISE = SensorNoise(levels=4095, electrons=WHITE, read=READ)
 
 
@@ -94,6 +97,8 @@ def photograph(scene, pose, texture=None, seed=0, rays=None, noise=True):
 
 
 FREE = Knowns(rcm_sigma_mm=None)
+
+
 TIPS = ((1.0, 0.5, 4.0), (-1.5, -1.0, 3.0))
 
 
@@ -105,6 +110,10 @@ def miss_um(outcome, pose):
 def sigmas_off(outcome, pose):
     error = outcome.apex_mm - pose.apex
     return math.sqrt(float(error @ np.linalg.solve(outcome.covariance[:3, :3], error)))
+
+
+def scene_pose(found):
+    return Pose(found.apex_mm, found.axis)
 
 
 @pytest.mark.parametrize("tip", TIPS)
@@ -123,10 +132,6 @@ def test_the_mean_over_noise_of_a_hard_patch_is_unbiased_below_a_fiftieth_of_a_p
     found = locate(photograph(scene, pose, noise=False, rays=32), scene, "cone", knowns=FREE, noise=NOISE)
     outline, true = (scene.camera.project(scene.outline(p, 0)) for p in (scene_pose(found), pose))
     assert np.max(np.abs(outline - true)) < 0.02
-
-
-def scene_pose(found):
-    return Pose(found.apex_mm, found.axis)
 
 
 @pytest.mark.parametrize("tip", TIPS)
@@ -250,47 +255,6 @@ def test_a_sequence_learns_the_retina_that_single_frames_cannot_see():
     result = locate_sequence(lambda: frames, scene, knowns=Knowns(0.01), noise=NOISE)
     assert result.learnt_from == 6
     assert np.mean([miss_um(o, p) for o, p in zip(result.outcomes, poses, strict=True)]) < 4.0
-
-
-def test_calibration_finds_the_half_angle_of_a_rig_and_says_that_the_size_of_the_scene_is_hidden():
-    true = scene_of(HardBeam(half_angle=math.radians(9.03)), "triple")
-    believed = scene_of(HardBeam(), "triple")
-    poses = [true.pose(np.array([1.5 * math.sin(t), 1.5 * math.cos(t), 3.0 + 0.3 * t])) for t in range(4)]
-    frames = [photograph(true, pose, seed=i, rays=6) for i, pose in enumerate(poses)]
-    found = calibrate(lambda: frames, believed, noise=NOISE)
-    assert math.degrees(found.values[0]) == pytest.approx(9.03, abs=2e-3)
-    assert found.observable["half_angle"]
-    assert not found.observable["camera_height"]
-    assert "camera_height: not observable" in found.statement()
-
-
-def test_calibration_finds_the_softness_of_the_edge_over_a_texture_and_states_an_honest_sigma():
-    """A blend of 0.3 believed to be 0.35, eight frames over a fundus' texture; within 4 sigmas, and to 0.02."""
-    true = scene_of(CyclesBeam(blend=0.3))
-    believed = scene_of(CyclesBeam(blend=0.35))
-    poses = [true.pose(np.array([2.0 * math.sin(t), 2.0 * math.cos(t), 2.5 + 0.4 * t])) for t in range(8)]
-    frames = [photograph(true, pose, fundus(0.2), seed=i) for i, pose in enumerate(poses)]
-    found = calibrate(lambda: frames, believed, noise=NOISE)
-    softness = NAMES.index("softness")
-    assert found.observable["softness"]
-    assert found.values[softness] == pytest.approx(0.3, abs=0.02)
-    assert abs(found.values[softness] - 0.3) < 4.0 * found.sigmas[softness]
-    assert found.applied(believed).beam.blend == pytest.approx(found.values[softness])
-
-
-def test_one_spotlight_tells_neither_half_angle_nor_camera_height_and_says_so():
-    """Half angle, height and RCM are off; what is not observable keeps a wide sigma and stays as it was."""
-    true = scene_of(HardBeam(half_angle=math.radians(9.03)), instrument={"rcm": (6.05, -0.04, 22.1)})
-    believed = scene_of(HardBeam())
-    poses = [true.pose(np.array([2.0 * math.sin(t), 2.0 * math.cos(t), 2.5 + 0.4 * t])) for t in range(6)]
-    frames = [photograph(true, pose, seed=i, rays=6) for i, pose in enumerate(poses)]
-    found = calibrate(lambda: frames, believed, noise=NOISE)
-    truth = np.array([math.radians(9.03), 0.0, 12.0, 110.0, 6.05, -0.04, 22.1])
-    assert np.all(np.abs(found.values - truth) < 4.0 * found.sigmas)
-    assert not found.observable["half_angle"]
-    assert not found.observable["camera_height"]
-    assert found.applied(believed).camera == believed.camera
-    assert "softness" not in found.statement()
 
 
 def test_knowns_refuse_nonsense_and_published_methods_refuse_knowns():
