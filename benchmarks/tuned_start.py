@@ -58,7 +58,7 @@ def disc_of(colour: np.ndarray, scene: Scene) -> np.ndarray:
     """Where the eye's optic disc lies on the wall `[3]` [mm]: the brightest millimetre of its albedo `[H, W]`."""
     smooth = cv2.GaussianBlur(colour, (0, 0), 0.5 / scene.camera.pixel_pitch)
     row, column = np.unravel_index(int(np.argmax(smooth)), smooth.shape)
-    sight = scene.camera.back_project(np.array([column + 0.5, row + 0.5]))
+    sight = scene.camera.rays(np.array([column + 0.5, row + 0.5])).directions
     return np.asarray(scene.surface.intersect(scene.eye, scene.camera.centre, sight))
 
 

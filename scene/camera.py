@@ -117,7 +117,3 @@ class Camera(Model):
         scale = self.focal_length_px / np.where(below > 0.0, below, np.nan)
         half = self.resolution / 2.0
         return np.stack([half + scale * p[..., 0], half - scale * p[..., 1]], axis=-1)
-
-    def back_project(self, pixels: ArrayLike) -> Array:
-        """Unit directions `[..., 3]` from the pinhole through pixel coordinates `[..., 2]` [px]."""
-        return self.rays(pixels).directions

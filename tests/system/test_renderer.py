@@ -34,7 +34,7 @@ def scene_of(**changes):
 
 def radiance_of(scene, pose, pixels, spotlight=0):
     """Lambert's closed form at pixel centres: albedo / pi * I(angle) * cos / d^2, from scene geometry alone."""
-    rays = scene.camera.back_project(pixels)
+    rays = scene.camera.rays(pixels).directions
     points = scene.surface.intersect(scene.eye, scene.camera.centre, rays)
     outward = points - scene.eye.centre
     normals = scene.surface.normals(scene.eye, outward / np.linalg.norm(outward, axis=-1, keepdims=True))
@@ -81,7 +81,7 @@ def test_flux_through_the_cone_is_the_stated_watts(name, convention):
     tile = Renderer(scene, samples=64).tile(pose, 0, seed=4)
     # area of the surface behind a pixel [mm2]: solid angle times distance squared over the cosine
     pixels = pixel_grid(tile.crop)
-    rays = scene.camera.back_project(pixels)
+    rays = scene.camera.rays(pixels).directions
     distance = scene.eye.intersect(scene.camera.centre, rays)
     normals = (scene.eye.centre - (scene.camera.centre + distance[..., None] * rays)) / scene.eye.radius
     solid_angle = (-rays[..., 2]) ** 3 / scene.camera.focal_length_px**2
@@ -95,7 +95,7 @@ def test_background_is_albedo_over_pi_times_irradiance():
     scene = scene_of(ambient=Ambient(irradiance=2.0, tilt=math.radians(10.0), azimuth=0.4))
     background = Renderer(scene).background()[..., 0]
     pixels = np.array([[20.5, 30.5], [200.5, 200.5], [380.5, 100.5]])
-    rays = scene.camera.back_project(pixels)
+    rays = scene.camera.rays(pixels).directions
     points = scene.camera.centre + scene.eye.intersect(scene.camera.centre, rays)[:, None] * rays
     normals = (scene.eye.centre - points) / scene.eye.radius
     light = np.array(
@@ -130,7 +130,7 @@ def test_texture_lies_where_the_arc_coordinates_say():
     scene = scene_of(camera=Camera(resolution=1000), retina=PhotoRetina())
     background = Renderer(scene).background()[..., 0]
     pixels = pixel_grid(Crop(0, 0, 1000, 1000))
-    rays = scene.camera.back_project(pixels)
+    rays = scene.camera.rays(pixels).directions
     points = scene.camera.centre + scene.eye.intersect(scene.camera.centre, rays)[..., None] * rays
     cosine = ((scene.eye.centre - points) / scene.eye.radius)[..., 2]
     arc = to_arc(scene, points)

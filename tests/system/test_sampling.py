@@ -69,7 +69,7 @@ def test_a_beam_is_refined_where_it_is_steep_and_nowhere_else():
     for name, beam in {**BEAMS, "step inside": step}.items():
         scene = scene_of(beam=beam)
         row, column = np.divmod(rim_pixels(scene, pose, 0).astype(int), 400)
-        rays = scene.camera.back_project(np.stack([column, row], axis=-1) + 0.5)
+        rays = scene.camera.rays(np.stack([column, row], axis=-1) + 0.5).directions
         to_point = scene.surface.intersect(scene.eye, scene.camera.centre, rays) - pose.apex
         angles[name] = np.degrees(np.arccos(to_point @ pose.axis / np.linalg.norm(to_point, axis=-1)))
     assert not angles["soft"].size

@@ -201,7 +201,7 @@ def test_float32_is_enough_for_the_geometry(shaft):
     stage = Renderer(scene)._lit
     assert ("Sphere" in str(stage.retina)) == (shaft is None)
     pixels = np.random.default_rng(1).uniform(50.0, 4950.0, (4000, 2))
-    rays = scene.camera.back_project(pixels)
+    rays = scene.camera.rays(pixels).directions
     expected = scene.surface.intersect(scene.eye, np.broadcast_to(scene.camera.centre, rays.shape), rays)
     # the sensor's own rays begin at its near plane
     film = mi.Point2f(pixels.T.astype(np.float32))

@@ -46,7 +46,7 @@ def scene_on(name, **parts):
 def radiance_of(scene, pose, crop):
     """Lambert's closed form at pixel centres: albedo / pi * I(angle) * cos / d^2, from scene geometry alone."""
     x, y = np.meshgrid(crop.column + np.arange(crop.width) + 0.5, crop.row + np.arange(crop.height) + 0.5)
-    rays = scene.camera.back_project(np.stack([x, y], axis=-1))
+    rays = scene.camera.rays(np.stack([x, y], axis=-1)).directions
     points = scene.surface.intersect(scene.eye, scene.camera.centre, rays)
     outward = points - scene.eye.centre
     normals = scene.surface.normals(scene.eye, outward / np.linalg.norm(outward, axis=-1, keepdims=True))

@@ -28,7 +28,7 @@ def _tile(scene, pose, axis, spotlight):
     low = np.clip(np.floor(edge.min(axis=0)).astype(int) - 8, 0, side)
     high = np.clip(np.ceil(edge.max(axis=0)).astype(int) + 8, 0, side)
     x, y = np.meshgrid(np.arange(low[0], high[0]) + 0.5, np.arange(low[1], high[1]) + 0.5)
-    rays = scene.camera.back_project(np.stack([x, y], axis=-1))
+    rays = scene.camera.rays(np.stack([x, y], axis=-1)).directions
     pinhole = scene.camera.centre
     wall = pinhole + scene.eye.intersect(pinhole, rays)[..., None] * rays
     light = wall - pose.apex

@@ -30,7 +30,7 @@ def cast(scene, pose, low, size, k=16):
     """Mean irradiance per pixel from k x k rays, with scene's own geometry only."""
     x = low[0] + (np.arange(size[0] * k) + 0.5) / k
     y = low[1] + (np.arange(size[1] * k) + 0.5) / k
-    rays = scene.camera.back_project(np.stack(np.meshgrid(x, y), axis=-1))
+    rays = scene.camera.rays(np.stack(np.meshgrid(x, y), axis=-1)).directions
     points = scene.surface.intersect(scene.eye, scene.camera.centre, rays)
     outward = points - scene.eye.centre
     normals = scene.surface.normals(scene.eye, outward / np.linalg.norm(outward, axis=-1, keepdims=True))

@@ -14,7 +14,7 @@ half_angles = st.floats(np.radians(5.0), np.radians(15.0))
 @given(st.floats(0, 5000), st.floats(0, 5000), st.sampled_from([12.0, 12.5, 20.0]))
 def test_equations_1_to_7_are_the_ray_through_the_pixel_met_by_the_sphere(x, y, radius):
     camera, eye = Camera(), Eye(radius=radius)
-    ray = camera.back_project([x, y])
+    ray = camera.rays([x, y]).directions
     expected = camera.centre + eye.intersect(camera.centre, ray) * ray
     np.testing.assert_allclose(retina_points(camera, eye, [x, y]), expected, rtol=0, atol=1e-10)
 

@@ -50,7 +50,7 @@ def albedo(texture, points):
 
 
 def cast(scene, x, y):
-    rays = scene.camera.back_project(np.stack(np.meshgrid(x, y), axis=-1))
+    rays = scene.camera.rays(np.stack(np.meshgrid(x, y), axis=-1)).directions
     return scene.surface.intersect(scene.eye, scene.camera.centre, rays)
 
 

@@ -34,7 +34,7 @@ def scene_of(beam="hard", spotlights="single"):
 def wall(rays=3):
     scene = scene_of()
     at = (np.arange(SIDE * rays) + 0.5) / rays
-    sight = scene.camera.back_project(np.stack(np.meshgrid(at, at), axis=-1))
+    sight = scene.camera.rays(np.stack(np.meshgrid(at, at), axis=-1)).directions
     return scene.surface.intersect(scene.eye, scene.camera.centre, sight)
 
 

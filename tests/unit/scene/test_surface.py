@@ -83,7 +83,7 @@ def test_a_ray_ends_on_the_surface_to_a_picometre(name, x, y, z, dx, dy):
 def test_every_pixel_of_the_camera_sees_the_far_wall(name):
     scene = Scene(eye=EYE, surface=SURFACES[name], camera=Camera(resolution=60))
     x, y = np.meshgrid(np.arange(60) + 0.5, np.arange(60) + 0.5)
-    rays = scene.camera.back_project(np.stack([x, y], axis=-1))
+    rays = scene.camera.rays(np.stack([x, y], axis=-1)).directions
     points = scene.surface.intersect(scene.eye, scene.camera.centre, rays)
     assert points.shape == (60, 60, 3)
     np.testing.assert_allclose(scene.depth(points), 0.0, atol=1e-9)
