@@ -15,7 +15,7 @@ from conespot.scene import Scene
 if TYPE_CHECKING:
     from mitsuba import BSDF, Mesh
 
-#: of neighbouring vertices [mm]: chords depart from the sphere by 10 nm, from the paper's bumps by up to 1.7 um
+#: of neighbouring vertices [mm]: chords depart from the sphere by 10 nm, from the paper's bumps by up to 3.2 um
 VERTEX_SPACING = 0.03
 
 

@@ -12,33 +12,17 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from pydantic import Field
 
+from conespot.scene.bump import Bump
 from conespot.scene.eye import Eye
 from conespot.scene.height_map import HeightMap
 from conespot.scene.model import Model, named
-from conespot.scene.quantity import Length, format_quantity
+from conespot.scene.quantity import format_quantity
 
 Array = NDArray[np.float64]
 _Ratio = Annotated[float, Field(gt=0.5, lt=2.0)]
 _SPHERE = (1.0, 1.0, 1.0)
 #: a Newton step [mm] below which the next one would be lost in rounding
 _CONVERGED = 1e-9
-
-
-class Bump(Model):
-    """A raised-cosine bump above (x, y): h = height cos^2(pi rho / diameter) for rho < diameter / 2.
-
-    rho is the distance along the sphere from the bump's centre. The paper (4.2) states diameter and height only;
-    the raised cosine has no kink at its foot.
-
-    >>> eye, surface = Eye(), Surface(bumps=(Bump(x=0.0, y=0.0, height=0.1),))
-    >>> surface.points(eye, [0.0, 0.0, -1.0]).round(9).tolist()
-    [0.0, 0.0, 0.1]
-    """
-
-    x: Length
-    y: Length
-    diameter: Length = Field(0.5, gt=0.0)
-    height: Length = Field(0.1, ge=0.0)
 
 
 class Surface(Model):
@@ -162,17 +146,16 @@ class Surface(Model):
         """Distance from the eye's centre `[N]` [mm] in unit directions `[N, 3]`, and its gradient there `[N, 3]`."""
         radius, gradient = self._wall(eye, d)
         for bump, axis in zip(self.bumps, self._axes(eye), strict=True):
-            widest = math.cos(min(bump.diameter / (2.0 * eye.radius), math.pi))
+            widest = math.cos(min(bump.reach / eye.radius, math.pi))
             near = np.flatnonzero(d @ axis > widest)
             here = d[near]
             # the chord gives the arc to full precision where the cosine would lose half the digits
             arc = 2.0 * eye.radius * np.arcsin(np.clip(np.linalg.norm(here - axis, axis=-1) / 2.0, 0.0, 1.0))
-            phase = np.pi * arc / bump.diameter
-            radius[near] -= bump.height * np.cos(phase) ** 2
-            slope = np.pi * bump.height / bump.diameter * np.sin(2.0 * phase)
+            height, slope = bump.at(arc)
+            radius[near] -= height
             away = here * np.sum(here * axis, axis=-1, keepdims=True) - axis  # tangential, away from the centre
             length = np.linalg.norm(away, axis=-1)
-            gradient[near] += (slope * eye.radius / np.where(length > 0.0, length, 1.0))[:, None] * away
+            gradient[near] -= (slope * eye.radius / np.where(length > 0.0, length, 1.0))[:, None] * away
         if self.height_map is not None:
             height, by_arc = self.height_map.at(eye.arc(d))
             radius -= height
@@ -204,16 +187,22 @@ def _range(lengths: list[float]) -> str:
     return format_quantity(low, "length") if low == high else f"{low:g} to {format_quantity(high, 'length')}"
 
 
-def bump_grid() -> Surface:
-    """The paper's deformation (4.2): 15 bumps in a 3 x 5 grid, centred in equal cells of the 10 x 10 mm area."""
-    return Surface(
-        bumps=tuple(
-            Bump(x=10.0 * ((i + 0.5) / 3.0 - 0.5), y=10.0 * ((j + 0.5) / 5.0 - 0.5)) for j in range(5) for i in range(3)
-        )
-    )
+_GAUSSIAN, _COSINE = Bump(x=0.0, y=0.0, profile="gaussian"), Bump(x=0.0, y=0.0, profile="cosine")
 
 
-SURFACES = {"smooth": Surface(), "bumps": bump_grid()}
+def bump_grid(apart: tuple[float, float] = (5.0, 2.5), like: Bump = _GAUSSIAN) -> Surface:
+    """15 bumps `like` one in a 3 x 5 grid about the pole, so far `apart` in x and y [mm].
+
+    The paper's deformation (4.2) is bumps "around 0.5 mm in diameter", 0.1 mm high, in "a 3 x 5 grid across the area
+    of interest" of 10 x 10 mm. The defaults are the reading that explains Table V: Gaussians, in a grid from edge to
+    edge of the area. docs/reproduction.md has the others that were tried.
+    """
+    columns, rows = apart[0] * np.arange(-1.0, 2.0), apart[1] * np.arange(-2.0, 3.0)
+    return Surface(bumps=tuple(like.model_copy(update={"x": float(x), "y": float(y)}) for y in rows for x in columns))
+
+
+#: `bumps-literal` is what Table V does not fit: raised cosines, each in the middle of one of 15 equal cells
+SURFACES = {"smooth": Surface(), "bumps": bump_grid(), "bumps-literal": bump_grid((10.0 / 3.0, 2.0), _COSINE)}
 
 
 AnySurface = Annotated[Surface, named(SURFACES, "surface")]

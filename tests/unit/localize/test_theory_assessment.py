@@ -13,7 +13,7 @@ from conespot.scene.camera import Camera
 from conespot.scene.emva import Emva
 from conespot.scene.scene import Scene
 from conespot.scene.sensor import Linear
-from conespot.scene.surface import bump_grid
+from conespot.scene.surface import SURFACES
 
 TIP = np.array([0.0, 0.0, 6.0])  # its outline crosses a bump
 
@@ -24,7 +24,7 @@ def test_a_smooth_surface_taken_for_smooth_moves_nothing():
 
 
 def test_the_step_off_the_truth_is_where_a_whole_fit_of_the_bumpy_outline_ends():
-    bumpy = Scene(surface=bump_grid(), camera=Camera(resolution=1000))
+    bumpy = Scene(surface=SURFACES["bumps-literal"], camera=Camera(resolution=1000))
     pose = bumpy.pose(TIP)
     pixels = bumpy.camera.project(bumpy.outline(pose, 0, 256))
     fit = fit_outline(pixels, Scene(camera=bumpy.camera), knowns=Knowns(rcm_sigma_mm=None), start=pose, robust=False)

@@ -15,6 +15,7 @@ from conespot.scene.document import read_document
 from conespot.scene.height_map import ReliefMap
 from conespot.scene.identity import identity
 from conespot.scene.scene import read_scene
+from conespot.scene.surface import SURFACES as KNOWN
 from conespot.scene.surface import Bump, Surface, bump_grid, surface_name
 
 EYE = Eye(radius=12.5)
@@ -27,6 +28,7 @@ SURFACES = {
     "ellipsoid": Surface(semi_axes=LONG),
     "flat ellipsoid": Surface(semi_axes=(1.1, 1.0, 0.9)),
     "bumps": bump_grid(),
+    "literal bumps": KNOWN["bumps-literal"],
     "height map": Surface(height_map=DRUSEN),
     "all": Surface(semi_axes=LONG, bumps=bump_grid().bumps, height_map=DRUSEN),
 }
@@ -226,6 +228,7 @@ def test_interreflection_is_refused_off_the_sphere():
 def test_surfaces_are_called_what_they_are_made_of():
     assert surface_name(load_scene("paper").surface) == "smooth"
     assert surface_name(bump_grid()) == "bumps"
+    assert surface_name(KNOWN["bumps-literal"]) == "bumps-literal"
     assert surface_name(Surface(bumps=(Bump(x=0.0, y=0.0),))) == "1 bump"
     assert surface_name(Surface(semi_axes=(1.0, 1.0, 1.08))) == "ellipsoid 1 x 1 x 1.08"
     assert surface_name(SURFACES["height map"]) == "height map"
