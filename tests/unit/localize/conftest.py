@@ -11,7 +11,7 @@ from conespot.scene.retina import UniformRetina
 from conespot.scene.spotlights import RIGS, spotlight_axes
 
 
-def make_scene(preset="paper-code", *, resolution=1000, rig="single", **parts):
+def make_scene(preset="paper-code-literal", *, resolution=1000, rig="single", **parts):
     scene = load_scene(preset)
     camera = Camera(resolution=resolution)
     return Scene(**{**dict(scene), "camera": camera, "spotlights": RIGS[rig], "retina": UniformRetina(), **parts})
