@@ -14,7 +14,7 @@ import pandas as pd
 
 from conespot.results.assumptions import Assumptions, Pairs, assumptions, pairs, power_in_words, watts_of
 from conespot.results.columns import column
-from conespot.results.paper_values import BOTH, NOTES, REFERENCE_POWER_W, STEADY_ABOVE_W, paper_value
+from conespot.results.paper_values import BOTH, NOTES, REFERENCE_POWER_W, STEADY_ABOVE_W, paper_value, purpose
 from conespot.results.run import Run
 from conespot.results.table import Block, Table, number
 from conespot.results.variants import Variant, by_axes, paired
@@ -112,7 +112,8 @@ def _beside_paper(run: Run, key: Key, cell: Cell, source: str) -> _Records:
         known = paper_value(source, key.trajectory, key.spotlights, quantity, key.metric)
         if known is not None:
             ours = cell.box[statistic]
-            compared = {"quantity": quantity, "ours": ours, "published": known, "ratio": ours / known}
+            used = purpose(source, key.trajectory, key.spotlights, quantity, key.metric)
+            compared = {"quantity": quantity, "ours": ours, "published": known, "ratio": ours / known, "used": used}
             counts = {"n": cell.box["n"], "failed": cell.box["failed"]}
             assumed = assumptions(run.cases, cell.about).columns()
             records.append({"source": source, **key._asdict(), **compared, **counts, **assumed})
@@ -177,7 +178,7 @@ def _error_block(
         line = (f"{_METRICS[metric]} {_UNITS[metric]}", where, record["spotlights"], *counts)
         found.setdefault(line, {})[record["quantity"]] = record
     names = [(quantity, name) for quantity in QUANTITIES for name in ("ours", "published", "ratio")]
-    lines = tuple((*line, *(number(pair[q][k]) if q in pair else "" for q, k in names)) for line, pair in found.items())
+    lines = tuple((*line, *(_shown(pair, q, k) for q, k in names)) for line, pair in found.items())
     header = ("error", "trajectory", "spotlights", "n", "failed", "AE", "paper", "ratio", "ME", "paper", "ratio")
     about = _about(cells)
     heading = f"{variant.label}, at {power_in_words(run.cases, about, records[0]['power_w'])}"
@@ -186,6 +187,14 @@ def _error_block(
 
 def _about(cells: Iterable[Cell]) -> Pairs:
     return list(dict.fromkeys(pair for cell in cells for pair in cell.about))
+
+
+def _shown(pair: dict[str, dict[str, Any]], quantity: str, name: str) -> str:
+    """A number of a table's line; the published one that was fitted has an asterisk."""
+    if quantity not in pair:
+        return ""
+    fitted = name == "published" and pair[quantity]["used"] == "fit"
+    return f"{number(pair[quantity][name])}{'*' if fitted else ''}"
 
 
 def _by_power(run: Run, variant: Variant, cells: _Cells) -> tuple[_Records, Block] | None:

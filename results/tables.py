@@ -8,20 +8,22 @@ import pandas as pd
 
 from conespot.results.error_tables import ERROR_TABLES, POWER, cells
 from conespot.results.precision import precision_table
+from conespot.results.released import released_table
 from conespot.results.run import Run
 from conespot.results.table import Table
 from conespot.results.table_1 import table_1
+from conespot.results.white import white_table
 
 #: tables that need no boxes, before and after those of errors, by the name of their file
 _FIRST: dict[str, Callable[[Run], Table | None]] = {"table_1": table_1}
-_LAST: dict[str, Callable[[Run], Table | None]] = {"precision": precision_table}
+_LAST: dict[str, Callable[[Run], Table | None]] = {"precision": precision_table, "white": white_table, "released": released_table}
 
 #: every table there can be: tables/NAME.csv
 TABLE_NAMES = (*_FIRST, *(kind.name for kind in ERROR_TABLES), *_LAST)
 
 
 def make_tables(run: Run, boxes: pd.DataFrame | None) -> list[Table]:
-    """Every table that the run has rows for: I, IV, V, the errors by power, and precision."""
+    """Every table that the run has rows for: I, IV, V, errors by power, precision, white level, released estimates."""
     first, last = ({name: make(run) for name, make in some.items()} for some in (_FIRST, _LAST))
     of_errors: list[Table | None] = []
     if run.rows is not None and boxes is not None:

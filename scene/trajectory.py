@@ -55,18 +55,19 @@ class Helix(Model):
 
 
 class Spiral(Model):
-    """A flat Archimedean spiral outwards at one height."""
+    """An Archimedean spiral outwards, at one height or climbing steadily by `climb` from the first pose to the last."""
 
     kind: Literal["spiral"] = "spiral"
     radius: Length = Field(3.0, gt=0.0)
     height: Length = Field(5.0, gt=0.0)
+    climb: Length = 0.0
     turns: float = Field(3.0, gt=0.0, le=1000.0)
 
     def positions(self, poses: int, rng: np.random.Generator) -> Array:
         """Tip positions `[poses, 3]` [mm]."""
         u = np.linspace(0.0, 1.0, poses)
         phi = 2.0 * math.pi * self.turns * u
-        z = np.full(poses, self.height)
+        z = self.height + self.climb * u
         return np.stack([self.radius * u * np.cos(phi), self.radius * u * np.sin(phi), z], axis=-1)
 
 
