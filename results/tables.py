@@ -16,7 +16,11 @@ from conespot.results.white import white_table
 
 #: tables that need no boxes, before and after those of errors, by the name of their file
 _FIRST: dict[str, Callable[[Run], Table | None]] = {"table_1": table_1}
-_LAST: dict[str, Callable[[Run], Table | None]] = {"precision": precision_table, "white": white_table, "released": released_table}
+_LAST: dict[str, Callable[[Run], Table | None]] = {
+    "precision": precision_table,
+    "white": white_table,
+    "released": released_table,
+}
 
 #: every table there can be: tables/NAME.csv
 TABLE_NAMES = (*_FIRST, *(kind.name for kind in ERROR_TABLES), *_LAST)
