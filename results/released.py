@@ -8,7 +8,7 @@ import numpy as np
 import pandas as pd
 from pydantic import TypeAdapter, ValidationError
 
-from conespot.results.assumptions import assumptions
+from conespot.results.assumptions import assumptions, pairs
 from conespot.results.paper_values import paper_released
 from conespot.results.run import Run
 from conespot.results.table import Block, Table, number
@@ -39,7 +39,7 @@ def released_table(run: Run) -> Table | None:
                 continue
             ours = statistics(good, *scene)
             counts = {"n": len(good), "failed": len(here) - len(good)}
-            columns = assumptions(run.cases, here).columns()
+            columns = assumptions(run.cases, pairs(here)).columns()
             for name, known in paper_released().items():
                 compared = {"statistic": name, "ours": ours[name], "published": known, "ratio": ours[name] / known}
                 records.append({**variant.setting, **axes, **compared, **counts, **columns})

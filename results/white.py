@@ -15,7 +15,7 @@ import pandas as pd
 from numpy.typing import NDArray
 from pydantic import TypeAdapter, ValidationError
 
-from conespot.results.assumptions import Cases, assumptions
+from conespot.results.assumptions import Cases, assumptions, pairs
 from conespot.results.paper_values import FITTED, REFERENCE_POWER_W, paper_value
 from conespot.results.run import Run
 from conespot.results.table import Block, Table
@@ -50,24 +50,27 @@ def white_level(errors: Array, powers: Array, white: float, target: float) -> Wh
     `errors` `[poses, P]` [mm] are those at `powers` `[P]` [W], NaN where not localized, with `white` [W/m2/sr].
     """
     value = _explains(np.nanmean(errors, axis=0), powers, white, target)
-    if not math.isfinite(value):
+    if value in (0.0, math.inf):
         return None
     ends = [_explains(np.nanmean(errors, axis=0), powers, white, target + s * _ROUNDING) for s in (-1.0, 1.0)]
     rng = np.random.default_rng(20230601)
     draws = rng.integers(0, len(errors), (_RESAMPLES, len(errors)))
     found = [_explains(np.nanmean(errors[draw], axis=0), powers, white, target) for draw in draws]
-    low, high = np.nanpercentile(found, [16.0, 84.0])
+    low, high = np.percentile(found, [16.0, 84.0], method="nearest")
     return WhiteLevel(value, (min(ends), max(ends)), (float(low), float(high)))
 
 
 def _explains(means: Array, powers: Array, white: float, target: float) -> float:
-    """`white` over the power at which the fitted mean error first falls to `target`; NaN if it never does."""
+    """`white` over the power at which the fitted mean error first falls to `target`.
+
+    0 if all these powers are too little for that, infinite if all are too much.
+    """
     middle = float(np.mean(np.log(powers)))
     curve = np.polynomial.Polynomial.fit(np.log(powers) - middle, means, 2)
     fine = np.linspace(np.log(powers.min()), np.log(powers.max()), 2001)
     over = curve(fine - middle) > target
-    if not over[0] or over.all():
-        return math.nan
+    if over.all() or not over[0]:
+        return 0.0 if over.all() else math.inf
     return white / math.exp(fine[int(np.argmin(over))])
 
 
@@ -92,7 +95,7 @@ def white_table(run: Run) -> Table | None:
         numbers = (found.value, *found.rounding, *found.poses)
         names = ("white_w_m2_sr", "rounding_low", "rounding_high", "poses_low", "poses_high")
         where = {"source": source, "trajectory": trajectory, "spotlights": rig, "quantity": quantity, "metric": metric}
-        columns = assumptions(run.cases, cell).columns()
+        columns = assumptions(run.cases, pairs(cell)).columns()
         records.append(
             {**variant.setting, **where, "published": target, **dict(zip(names, numbers, strict=True)), **columns}
         )

@@ -30,6 +30,10 @@ class Surface(Model):
 
     The wall touches the origin with its posterior pole. It is an ellipsoid with `semi_axes` along x, y and z in units
     of the eye's radius: (1, 1, 1.1) is a myopic eye, longer than wide.
+
+    >>> eye, surface = Eye(), Surface(bumps=(Bump(x=0.0, y=0.0, height=0.1),))
+    >>> surface.points(eye, [0.0, 0.0, -1.0]).round(9).tolist()
+    [0.0, 0.0, 0.1]
     """
 
     semi_axes: tuple[_Ratio, _Ratio, _Ratio] = _SPHERE

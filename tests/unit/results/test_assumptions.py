@@ -29,7 +29,7 @@ def test_the_preset_as_coded(make_cases, make_rows):
         radius="12.5 mm",
         edge="Cycles blend 1 (fully soft), half angle 9 deg",
         power_convention="isotropic (I0 = P / 4 pi)",
-        transfer="sRGB, 8 bit, white 1 W/m2/sr",
+        transfer="sRGB, 8 bit, white 0.25 W/m2/sr",
         surface_shape="smooth",
         threshold="fixed 50 of 255 after median 9",
         ambiguity="RCM for one spotlight",

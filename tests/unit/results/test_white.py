@@ -16,8 +16,8 @@ POWERS = np.array([1.0, 2.0, 3.0, 4.0, 6.0])
 
 def errors(scatter=0.0, poses=100):
     """Mean errors that fall by 5 um an e-fold of power and are 31 um at 4 W."""
-    noise = np.random.default_rng(5).normal(0.0, scatter, (poses, 1))
-    return 0.031 - 0.005 * np.log(POWERS / 4.0) + noise - noise.mean()
+    noise = np.random.default_rng(5).normal(size=(poses, 1))
+    return 0.031 - 0.005 * np.log(POWERS / 4.0) + scatter * (noise - noise.mean()) / noise.std()
 
 
 def test_the_power_that_makes_the_published_mean_is_one_over_the_white_level():

@@ -64,9 +64,17 @@ def test_a_preset_survives_being_written_and_read(tmp_path, name):
 
 
 def test_the_presets_differ_in_the_radius_alone():
-    paper, code = load_scene("paper"), load_scene("paper-code")
+    paper, code = load_scene("paper"), load_scene("paper-code-literal")
     assert (paper.eye.radius, code.eye.radius) == (12.0, 12.5)
-    assert paper.model_copy(update={"eye": code.eye}) == code
+    assert paper == code.model_copy(update={"eye": paper.eye})
+
+
+def test_the_fitted_preset_differs_in_what_shows_as_white_alone_and_shows_the_same_background():
+    fitted, literal = load_scene("paper-code"), load_scene("paper-code-literal")
+    assert fitted == literal.model_copy(update={"sensor": fitted.sensor, "ambient": fitted.ambient})
+    shown = [scene.ambient.irradiance / scene.sensor.white for scene in (fitted, literal)]
+    assert shown[0] == pytest.approx(shown[1], rel=1e-12)
+    assert (fitted.sensor.white, literal.sensor.white) == (0.25, 1.0)
 
 
 def test_a_preset_can_be_changed_in_part(tmp_path):
