@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import functools
 from collections.abc import Iterator, Sequence
 from typing import Any, assert_never
 
@@ -15,6 +16,9 @@ from conespot.scene import srgb
 from conespot.scene.emva import Emva
 from conespot.scene.sensor import Linear, Sensor, Srgb8
 
+#: of the table of sRGB values, fine enough that few hold two of them
+_BINS = 2**16
+
 Pixels = NDArray[np.uint8] | NDArray[np.uint16]
 
 
@@ -26,13 +30,34 @@ def encode(radiance: NDArray[np.floating[Any]], sensor: Srgb8 | Linear) -> Pixel
     relative = np.clip(radiance / np.float32(sensor.white), 0.0, 1.0)
     match sensor:
         case Srgb8():
-            relative = srgb.encoded(relative)
+            return _srgb8(np.asarray(relative, np.float32))
         case Linear():
-            pass
+            values = np.floor(relative * sensor.full_scale + 0.5)
+            return values.astype(np.uint8) if sensor.full_scale <= 255 else values.astype(np.uint16)
         case unknown:
             assert_never(unknown)
-    values = np.floor(relative * sensor.full_scale + 0.5)
-    return values.astype(np.uint8) if sensor.full_scale <= 255 else values.astype(np.uint16)
+
+
+def _srgb8(relative: NDArray[np.float32]) -> NDArray[np.uint8]:
+    """Values of relative radiances 0 to 1: looked up, and worked out where a bin of the table holds two of them."""
+    table, alone = _srgb8_table()
+    bins = (relative * np.float32(_BINS)).astype(np.int32)
+    values = np.take(table, bins)
+    rest = np.flatnonzero(~np.take(alone, bins))
+    values.reshape(-1)[rest] = _rounded(relative.reshape(-1)[rest])
+    return values
+
+
+@functools.cache
+def _srgb8_table() -> tuple[NDArray[np.uint8], NDArray[np.bool_]]:
+    """The value in each of `_BINS` bins and of white, and whether the bin and its neighbours hold no other."""
+    low = _rounded(np.arange(_BINS + 1, dtype=np.float32) / np.float32(_BINS))
+    padded = np.pad(low, (1, 2), mode="edge")
+    return low, (padded[:-3] == low) & (padded[3:] == low)
+
+
+def _rounded(relative: NDArray[np.float32]) -> NDArray[np.uint8]:
+    return np.floor(srgb.encoded(relative) * np.float32(255.0) + np.float32(0.5)).astype(np.uint8)
 
 
 class Exposure:

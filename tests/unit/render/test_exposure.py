@@ -4,6 +4,8 @@ import numpy as np
 import pytest
 
 from conespot.render import Crop, Exposure, Tile
+from conespot.render.exposure import encode
+from conespot.scene import srgb
 from conespot.scene.sensor import SENSORS, Linear, Srgb8
 
 POWERS = (0.05, 1.0, 0.3)
@@ -55,3 +57,14 @@ def test_a_shown_frame_cannot_be_written_to(background, tiles):
     exposure = Exposure(background, Srgb8())
     with exposure.shown(tiles, 1.0) as image, pytest.raises(ValueError, match="read-only"):
         image[0, 0] = 1
+
+
+def test_looking_values_up_gives_what_working_them_out_gives():
+    """Radiances from 2^-20 of white to white, and those around every step between values; to the byte."""
+    levels = (np.arange(255) + 0.5) / 255.0
+    steps = np.where(levels <= 0.04045, levels / 12.92, ((levels + 0.055) / 1.055) ** 2.4).astype(np.float32)
+    around = (steps.view(np.uint32)[:, None] + np.arange(-200, 200).astype(np.uint32)).view(np.float32)
+    spread = np.random.default_rng(1).uniform(-20.0, 1.0, 1_000_000)
+    radiance = np.concatenate([around.ravel(), np.exp2(spread).astype(np.float32), np.float32([0.0, 1.0, 2.0, -1.0])])
+    plain = np.floor(srgb.encoded(np.clip(radiance, 0.0, 1.0)) * 255 + 0.5).astype(np.uint8)
+    np.testing.assert_array_equal(encode(radiance, Srgb8()), plain)
