@@ -40,7 +40,7 @@ def seconds(work: Callable[[int], object]) -> float:
 
 
 def throughput(scene: Scene) -> None:
-    """Camera rays a second: ours with all samples, and Mitsuba's own loop over as many in the same scene, and in a mesh."""
+    """Camera rays a second: ours with all samples, and Mitsuba's own loop over as many, there and with a mesh."""
     mi = kernel.load()[0]
     pose = scene.pose(TIP)
     renderer = Renderer(scene, samples=SAMPLES, noise=0.0)
