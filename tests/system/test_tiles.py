@@ -24,14 +24,13 @@ def scene_of(**changes):
 
 def test_sum_of_tiles_times_power_is_one_render_at_that_power():
     """z-test per pixel, Sidak-corrected: the tiled frame against brute force with all lights in one scene of a mesh."""
-    import mitsuba as mi
-
-    from conespot.render import emitters
+    from conespot.render import emitters, kernel
     from conespot.render.retina_mesh import retina_mesh
 
     scene = scene_of(spotlights=RIGS["triple"], retina=PhotoRetina(), camera=Camera(resolution=300))
     pose = scene.pose(np.array([0.8, 0.4, 4.0]))
     power = 0.25
+    mi, _, _ = kernel.load()
     renderer = Renderer(scene, samples=16)
     runs = 16
     tiled = np.empty((runs, 300, 300))
