@@ -2,17 +2,18 @@
 
 from __future__ import annotations
 
-import argparse
 import os
-import signal
 import sys
-from collections.abc import Callable, Sequence
-from pathlib import Path
-from typing import TYPE_CHECKING
 
 from conespot.campaigns.ending import Ending, RunError
+from conespot.campaigns.interruption import interruption
 
+TYPE_CHECKING = False  # `typing` takes long to import, and until `main` begins Ctrl-C gives a traceback
 if TYPE_CHECKING:
+    import argparse
+    from collections.abc import Callable, Sequence
+    from pathlib import Path
+
     from conespot.scene.document import Document
 
 #: options that set a key of the campaign
@@ -26,7 +27,12 @@ _SETTINGS = {
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Run a command line; the exit code: 0 done, 1 something failed, 2 bad input, 130 interrupted."""
+    """Run a command line; the exit code: 0 done, 1 something failed, 2 bad input, 130 interrupted.
+
+    Without `arguments` it is the process's own, and its signals are `campaigns.interruption`'s; else the caller's.
+    """
+    if arguments is None:
+        interruption.listen()
     options = _parser().parse_args(arguments)
     from conespot.scene.document import InputError
 
@@ -36,8 +42,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
         return code
     except InputError as error:
         return _complain(error, Ending.BAD_INPUT)
-    except KeyboardInterrupt as interruption:
-        return _complain(str(interruption) or "interrupted", Ending.INTERRUPTED)
+    except KeyboardInterrupt:
+        return _complain("interrupted", Ending.INTERRUPTED)
     except BrokenPipeError:
         # the reader of our output went away, `campaign plan | head`
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
@@ -61,6 +67,9 @@ def _say(text: object) -> None:
 
 
 def _parser() -> argparse.ArgumentParser:
+    import argparse
+    from pathlib import Path
+
     parser = argparse.ArgumentParser(
         prog="campaign",
         description="Render spotlights on a retina, localize the instrument that carries them, compare with the truth.",
@@ -112,6 +121,8 @@ def _parser() -> argparse.ArgumentParser:
 
 
 def _workers(text: str) -> int:
+    import argparse
+
     count = int(text) if text.isdecimal() else 0
     if not 1 <= count <= 1024:
         raise argparse.ArgumentTypeError("must be a whole number from 1 to 1024")
@@ -159,12 +170,12 @@ def _run(options: argparse.Namespace) -> Ending:
     if options.dry_run:
         return _plan(options)
     document = _document(options)
-    # a cluster ends a job with SIGTERM: that is an interruption too
-    signal.signal(signal.SIGTERM, signal.default_int_handler)
     from conespot.campaigns.pool import LocalPool
     from conespot.campaigns.session import carry_out
 
     session = carry_out(document, options.out, LocalPool(options.workers))
+    if session.interrupted:
+        return _complain(session.interrupted, Ending.INTERRUPTED)
     _say_results(session.folder)
     return _complain(session.sentence, Ending.FAILED) if session.lost else Ending.DONE
 

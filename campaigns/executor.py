@@ -22,5 +22,6 @@ class Executor(Protocol):
         """Records of the units as they are finished, in any order; every unit gives one.
 
         Frames are kept in the folder `frames` if it is given; `note` is told in a sentence what a user should know.
-        Raises RunError if nothing can be measured. Closing the iterator stops the work.
+        Raises RunError if nothing can be measured. Closing the iterator stops the work. Once
+        `campaigns.interruption.interruption` is asked for, it gives what is finished and ends.
         """

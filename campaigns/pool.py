@@ -13,6 +13,7 @@ from pathlib import Path
 from typing import assert_never
 
 from conespot.campaigns.ending import RunError
+from conespot.campaigns.interruption import interruption
 from conespot.campaigns.plan import Plan, Unit
 from conespot.campaigns.row import Record
 from conespot.campaigns.worker import Done, Lost, MakeBench, Note, Refused, Worker, make_bench
@@ -21,6 +22,8 @@ from conespot.campaigns.worker import Done, Lost, MakeBench, Note, Refused, Work
 #: tried twice, so two units that kill whoever takes them, and the machine may still be sound, lose as many
 _HOPELESS = 4
 _REMEDY = "try `campaign doctor`"
+#: how often an interruption is looked for [s]
+_GLANCE = 0.2
 
 
 @dataclass(frozen=True)
@@ -35,13 +38,14 @@ class LocalPool:
     ) -> Generator[Record]:
         """Records of the units as they are finished, in any order. `note` is told of lost workers.
 
-        Raises RunError if workers cannot start. Closing the iterator stops the workers.
+        Raises RunError if workers cannot start. Ends early when an interruption is asked for. Closing the iterator
+        stops the workers.
         """
         waiting = list(units)
         places = max(1, min(self.workers, len(waiting)))
         crew = _Crew(plan, waiting, places, note, lambda: Worker(plan, frames, self.make))
         try:
-            while crew.hand_out():
+            while not interruption.asked and crew.hand_out():
                 for worker in crew.wait():
                     record = crew.hear(worker)
                     if record is not None:
@@ -105,9 +109,9 @@ class _Crew:
         return any(worker.unit is not None for worker in self._workers())
 
     def wait(self) -> list[Worker]:
-        """The busy workers that have something to say; waits for one."""
+        """The busy workers that have something to say; waits for one, but not for long."""
         busy = [worker for worker in self._workers() if worker.unit is not None]
-        ready = wait([worker.connection for worker in busy])
+        ready = wait([worker.connection for worker in busy], _GLANCE)
         return [worker for worker in busy if worker.connection in ready]
 
     def hear(self, worker: Worker) -> Record | None:

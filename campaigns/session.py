@@ -10,6 +10,7 @@ from pathlib import Path
 
 from conespot.campaigns.ending import RunError
 from conespot.campaigns.executor import Executor
+from conespot.campaigns.interruption import interruption
 from conespot.campaigns.plan import Plan, make_plan
 from conespot.campaigns.pool import LocalPool
 from conespot.campaigns.progress import Progress
@@ -23,10 +24,14 @@ from conespot.scene.document import Document
 
 @dataclass(frozen=True)
 class Session:
-    """How a session ended: the run folder, and the poses that were `lost`, which another session tries again."""
+    """How a session ended: the run folder, the poses that were `lost`, which another session tries again.
+
+    `interrupted` says what is kept if the session was interrupted: then the rows are written and nothing else.
+    """
 
     folder: Path
     lost: tuple[Record, ...] = ()
+    interrupted: str = ""
 
     @property
     def sentence(self) -> str:
@@ -55,6 +60,8 @@ def run_campaign(
     for key, value in (settings or {}).items():
         document = override(document, key, value, f"settings[{key!r}]")
     session = carry_out(document, out, executor or LocalPool(workers))
+    if session.interrupted:
+        raise KeyboardInterrupt(session.interrupted)
     if session.lost:
         raise RunError(session.sentence)
     return session.folder
@@ -63,15 +70,16 @@ def run_campaign(
 def carry_out(document: Document, out: str | Path | None, executor: Executor) -> Session:
     """Do what is left of a campaign and write what its folder holds: rows, theory, tables, figures, report.
 
-    Raises as `run_campaign` does, but for poses that were lost.
+    Raises as `run_campaign` does, but for poses that were lost and for interruptions while poses are measured.
     """
     from conespot.results import write_results
 
     plan = make_plan(document)
     folder = Path(out or Path("runs") / plan.campaign.name)
     with open_store(folder, plan, document) as store:
-        if plan.cases:
-            _measure(plan, store, executor)
+        if plan.cases and _measure(plan, store, executor):
+            done = f"{len(store.records)} of {sum(len(g.positions) for g in plan.groups)} poses are kept"
+            return Session(folder, interrupted=f"interrupted; {done}, and the same command continues the run")
         if plan.campaign.theory:
             _write_theory(folder)
         lost = tuple(record for record in store.records.values() if record.error)
@@ -102,8 +110,11 @@ def renew_rows(folder: Path) -> None:
             store.write_rows()
 
 
-def _measure(plan: Plan, store: Store, executor: Executor) -> None:
-    """Do what is left, then write the rows of all that is finished. Units that were lost before are tried again."""
+def _measure(plan: Plan, store: Store, executor: Executor) -> bool:
+    """Do what is left, then write the rows of all that is finished; True when it was interrupted.
+
+    Units that were lost before are tried again.
+    """
     left = [u for u in plan.units() if u.key not in store.records or store.records[u.key].error]
     groups = {unit.key: plan.groups[unit.group] for unit in left}
     progress = Progress(
@@ -114,27 +125,26 @@ def _measure(plan: Plan, store: Store, executor: Executor) -> None:
     if plan.campaign.frames:
         frames = store.folder / "frames"
         frames.mkdir(exist_ok=True)
-    interrupted = False
-    records = executor.execute(plan, left, frames=frames, note=progress.note)
-    try:
-        for record in records:
-            store.append(record)
-            group = groups[record.unit]
-            progress.update(group.frames, group.work, sum(bool(f.reason) for f in record.findings))
-    except KeyboardInterrupt:
-        interrupted = True
-    except BaseException:
-        # what ended the run is what to say, not that its rows cannot be written either
-        with contextlib.suppress(InputError):
-            store.write_rows()
-        raise
-    finally:
-        records.close()
-    store.write_rows()
-    progress.close()
-    if interrupted:
-        done = f"{len(store.records)} of {sum(len(g.positions) for g in plan.groups)} poses are kept"
-        raise KeyboardInterrupt(f"interrupted; {done}, and the same command continues the run")
+    raised = False
+    with interruption:
+        records = executor.execute(plan, left, frames=frames, note=progress.note)
+        try:
+            for record in records:
+                store.append(record)
+                group = groups[record.unit]
+                progress.update(group.frames, group.work, sum(bool(f.reason) for f in record.findings))
+        except KeyboardInterrupt:  # in a program that calls `run_campaign`; the command has the flag in its place
+            raised = True
+        except BaseException:
+            # what ended the run is what to say, not that its rows cannot be written either
+            with contextlib.suppress(InputError):
+                store.write_rows()
+            raise
+        finally:
+            records.close()
+        store.write_rows()
+        progress.close()
+        return raised or interruption.asked
 
 
 def _write_theory(folder: Path) -> None:

@@ -12,13 +12,12 @@ import importlib.metadata
 import io
 import os
 import platform
-import signal
 from collections.abc import Iterator
 from pathlib import Path
 from typing import IO
 
 from conespot.campaigns.cases import write_cases
-from conespot.campaigns.ending import RunError, held_back
+from conespot.campaigns.ending import RunError
 from conespot.campaigns.plan import Plan
 from conespot.campaigns.row import Record, rows
 from conespot.campaigns.schema import resolved
@@ -59,16 +58,15 @@ class Store:
 
     def append(self, record: Record) -> None:
         """Keep a finished unit: it is on the disk when this returns. Raises RunError if the disk refuses."""
-        with held_back(signal.SIGINT, signal.SIGTERM):
-            line = record.model_dump_json(exclude_defaults=True).encode() + b"\n"
-            try:
-                while line:  # not through a buffer, which would try again when it is closed
-                    line = line[os.write(self._journal.fileno(), line) :]
-                os.fsync(self._journal.fileno())
-            except OSError as error:
-                reason = f"{self.folder}: cannot be written: {error.strerror}"
-                raise RunError(f"{reason}; what is finished is kept, and the same command continues the run") from None
-            self.records[record.unit] = record
+        line = record.model_dump_json(exclude_defaults=True).encode() + b"\n"
+        try:
+            while line:  # not through a buffer, which would try again when it is closed
+                line = line[os.write(self._journal.fileno(), line) :]
+            os.fsync(self._journal.fileno())
+        except OSError as error:
+            reason = f"{self.folder}: cannot be written: {error.strerror}"
+            raise RunError(f"{reason}; what is finished is kept, and the same command continues the run") from None
+        self.records[record.unit] = record
 
     def write_rows(self) -> int:
         """Write errors.csv and errors.parquet of what is finished, in the plan's order; their number of rows."""

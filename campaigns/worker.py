@@ -1,6 +1,6 @@
 """A worker: a process of one thread that measures unit after unit, until it is worn, dies, or is told to end.
 
-It ignores Ctrl-C, which is for the process that owns the store, and ends by itself when that process is gone.
+It ignores Ctrl-C, which is for the process that owns the store, and ends with that process, however that ends.
 """
 
 from __future__ import annotations
@@ -9,6 +9,7 @@ import contextlib
 import multiprocessing
 import os
 import signal
+import threading
 import traceback
 import warnings
 from collections.abc import Callable, Iterator
@@ -18,11 +19,14 @@ from multiprocessing.connection import Connection
 from pathlib import Path
 from typing import Protocol
 
-from conespot.campaigns.ending import held_back
+from conespot.campaigns.interruption import SIGNALS
 from conespot.campaigns.plan import Plan, Unit
 from conespot.campaigns.row import Record
 
 _ONE_THREAD = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "VECLIB_MAXIMUM_THREADS")
+
+#: a terminal sends these to every process of the command; SIGTERM still ends a worker, which is then replaced
+_DEAF = [number for number in SIGNALS if number != signal.SIGTERM]
 
 
 class Measures(Protocol):
@@ -125,7 +129,9 @@ class Worker:
 
 def _work(connection: Connection, plan: Plan, frames: Path | None, make: MakeBench) -> None:
     """A worker's life: units come in, messages go out."""
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    for number in _DEAF:
+        signal.signal(number, signal.SIG_IGN)
+    threading.Thread(target=_end_with_parent, daemon=True).start()
     with contextlib.suppress(EOFError, OSError):
         try:
             with warnings.catch_warnings(record=True) as caught:
@@ -147,6 +153,14 @@ def _work(connection: Connection, plan: Plan, frames: Path | None, make: MakeBen
             connection.send(Done(record, last))
 
 
+def _end_with_parent() -> None:
+    """End this process when its parent is gone, in the middle of a pose too."""
+    parent = multiprocessing.parent_process()
+    assert parent is not None, "workers are started by multiprocessing"
+    parent.join()
+    os._exit(1)
+
+
 def _sentence(error: BaseException) -> str:
     """The error in a line, with the place in the code it came from."""
     frame = traceback.extract_tb(error.__traceback__)[-1]
@@ -158,8 +172,7 @@ def _sentence(error: BaseException) -> str:
 def _born() -> Iterator[None]:
     """Processes started meanwhile use one thread and never hear of Ctrl-C: both must be so before they run anything."""
     before = {key: os.environ.get(key) for key in _ONE_THREAD}
-    resource_tracker.ensure_running()  # started with the first process, it would let the signal through
-    with held_back(signal.SIGINT):
+    with _held_back():
         os.environ.update(dict.fromkeys(_ONE_THREAD, "1"))
         try:
             yield
@@ -169,3 +182,18 @@ def _born() -> Iterator[None]:
                     del os.environ[key]
                 else:
                     os.environ[key] = value
+
+
+@contextlib.contextmanager
+def _held_back() -> Iterator[None]:
+    """Let the signals wait that a terminal sends to everybody; processes started meanwhile never get them."""
+    if not hasattr(signal, "pthread_sigmask"):
+        yield
+        return
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, _DEAF)
+    try:
+        resource_tracker.ensure_running()  # it would be started with the first process, and lets Ctrl-C through again
+        signal.pthread_sigmask(signal.SIG_BLOCK, _DEAF)
+        yield
+    finally:
+        signal.pthread_sigmask(signal.SIG_SETMASK, before)

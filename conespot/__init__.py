@@ -5,9 +5,7 @@
 
 from __future__ import annotations
 
-import importlib
-from typing import TYPE_CHECKING
-
+TYPE_CHECKING = False  # `typing` and `importlib` take longer to import than all that is done here
 if TYPE_CHECKING:
     from conespot.campaigns.session import run_campaign
     from conespot.localize.calibration import calibrate
@@ -67,6 +65,8 @@ __all__ = [
 def __getattr__(name: str) -> object:
     if name not in _HOMES:
         raise AttributeError(f"module 'conespot' has no attribute {name!r}")
+    import importlib
+
     value = getattr(importlib.import_module(f"conespot.{_HOMES[name]}"), name)
     globals()[name] = value
     return value
