@@ -109,8 +109,8 @@ def open_store(folder: Path, plan: Plan, document: Document) -> Iterator[Store]:
         begun_with = read_begun_with(folder)
         if not goes_on(begun_with):
             raise InputError(
-                f"{folder}: was begun by conespot {begun_with.get('conespot')} under other names and cannot go on; "
-                f"choose another --out (`campaign report {folder}` still makes its tables)"
+                f"{folder}: was begun by conespot {begun_with.get('conespot')}, which named cases otherwise, "
+                f"and cannot go on; choose another --out (`campaign report {folder}` still makes its tables)"
             )
         if begun_with.get("identity") != plan.identity:
             raise InputError(f"{folder}: holds the run of another campaign or other settings; choose another --out")

@@ -36,8 +36,9 @@ class Camera(Model):
 
     Pixel coordinates run x to the right and y down; the centre of the first pixel is at (0.5, 0.5).
 
-    Renderer, forward model, crops and occlusion know a camera by its `shape`, `rays` and `project` alone. Another kind
-    of camera is another class with these three, and a sensor of Mitsuba's in `render.stage`.
+    Renderer, forward model, crops and occlusion know a camera by its `shape`, `rays` and `project`; the fits take
+    `pixel_pitch` as their scale, and the published method has the paper's own pinhole. Another kind of camera is
+    another class with these, and a sensor of Mitsuba's in `render.stage`.
 
     >>> camera = Camera(resolution=1000)
     >>> camera.project([0.0, 0.0, 0.0]).tolist()

@@ -110,7 +110,9 @@ def _across(
     contrast = math.expm1(max(START.least_contrast, inside - outside)) / max(START.darkest_profile, there)
     clipped = float(np.mean(light[:, core] > START.white)) > START.clipped_share
     doubts = START.clipped_contrasts if clipped else START.doubted_contrasts if thorough else (1.0,)
-    ceiling = (1.0 + overview.floor) / math.exp(outside) if clipped else math.inf
+    # white over the surroundings; where a reference divides the light, it divides white too
+    unlit = 1.0 if ground is None else float(np.median(ground[:, core])) + overview.floor
+    ceiling = (1.0 + overview.floor) / (unlit * math.exp(outside)) if clipped else math.inf
     kept = valid[:, 1:].astype(float)
     steps = np.diff(log, axis=1) * kept
     blurred = np.convolve(profile, kernel, "same")

@@ -27,7 +27,7 @@ def test_it_can_still_be_reported_and_its_rows_are_used_as_they_are(run, capsys)
 def test_it_is_not_continued(run, capsys):
     assert main(["run", "power_sweep", "--poses", "1", "--out", str(run)]) == 2
     assert capsys.readouterr().err == (
-        f"campaign: {run}: was begun by conespot 0.1.0 under other names and cannot go on; "
+        f"campaign: {run}: was begun by conespot 0.1.0, which named cases otherwise, and cannot go on; "
         f"choose another --out (`campaign report {run}` still makes its tables)\n"
     )
     assert sorted(path.name for path in run.iterdir()) == sorted(path.name for path in OLD.iterdir())

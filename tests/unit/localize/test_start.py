@@ -154,6 +154,17 @@ def test_a_reference_without_spotlights_takes_the_disc_away():
     assert miss(start_in(frame(scene, pose, disc=20.0), scene, unlit), pose) < 0.12
 
 
+@pytest.mark.parametrize("beam", BEAMS)
+def test_a_clipped_patch_is_found_with_a_reference_as_without(beam):
+    scene = scene_of(beam)
+    pose = scene.pose(np.array(TIPS[0]))
+    clipped, unlit = (np.minimum(frame(scene, at, seed=seed) * 8.0, 4095.0) for seed, at in enumerate((pose, None)))
+    image = clipped.astype(np.uint16)
+    assert np.count_nonzero(image == 4095) > 1000
+    for reference in (None, unlit.astype(np.uint16)):
+        assert miss(start_in(image, scene, reference), pose) < 0.12
+
+
 def test_colours_and_floats_are_searched_too():
     scene = scene_of()
     pose = scene.pose(np.array(TIPS[0]))
