@@ -87,6 +87,7 @@ def begin(folder, run, finished):
     raise TimeoutError("nothing was finished in a minute")
 
 
+@pytest.mark.slow
 def test_a_metered_camera_exposes_alike_on_every_worker(tmp_path):
     """A noisy camera that sets its exposure time once a campaign: rows of one worker against those of two."""
     (tmp_path / "m.yaml").write_text(TEXT + "  scene.sensor: [cmv12000-mono]\n")

@@ -22,6 +22,7 @@ def scene_of(**changes):
     return Scene(**{"camera": Camera(resolution=400), "retina": UniformRetina(albedo=0.1), **changes})
 
 
+@pytest.mark.slow
 def test_sum_of_tiles_times_power_is_one_render_at_that_power():
     """z-test per pixel, Sidak-corrected: the tiled frame against brute force with all lights in one scene of a mesh."""
     from conespot.render import emitters, kernel

@@ -135,7 +135,7 @@ def test_channels_that_clip_at_different_places_are_fitted_jointly():
 
 
 def test_an_unknown_bump_under_the_outline_moves_the_tip_by_a_few_micrometres():
-    rough = Scene(beam=HardBeam(), camera=Camera(resolution=1000), sensor=Linear(bits=12), surface="bumps")
+    rough = Scene(beam=HardBeam(), camera=Camera(resolution=1000), sensor=Linear(bits=12), surface="bumps-literal")
     smooth = rough.model_copy(update={"surface": Surface()})
     pose = smooth.pose(np.array([-1.72, 0.07, 2.87]))
     displaced = np.linalg.norm(
