@@ -25,8 +25,8 @@ def test_help_is_instant_because_it_imports_nothing_heavy(tmp_path):
         assert done.returncode == 0
     assert min(times) < 0.5
     code = (
-        "import sys, campaigns.command\n"
-        "try: campaigns.command.main(['--help'])\n"
+        "import sys, conespot.campaigns.command as command\n"
+        "try: command.main(['--help'])\n"
         "except SystemExit: pass\n"
         "print(*{'numpy', 'pydantic', 'ruamel', 'cv2', 'pandas', 'mitsuba'} & set(sys.modules), file=sys.stderr)"
     )
@@ -65,7 +65,7 @@ def test_doctor_proves_that_this_machine_renders(tmp_path):
 
 
 def test_a_closed_pipe_is_no_traceback(tmp_path):
-    command = f"{sys.executable} -m campaigns.command plan power_sweep | head -1"
+    command = f"{sys.executable} -m conespot plan power_sweep | head -1"
     done = subprocess.run(["bash", "-c", command], capture_output=True, text=True, cwd=tmp_path)
     assert done.stderr == ""
     assert done.stdout.startswith("power_sweep: ")
