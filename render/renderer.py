@@ -74,16 +74,22 @@ class Renderer:
             self._lit.update(shaft.placed(self._mi, self._shaft, pose))
         self.rendered += 1
         radiance = self._radiance(crop, seed)
-        if self.edge_samples > self.samples and radiance.size:
+        # the few samples of a pixel that the edge barely enters may all miss it, and then show no noise either
+        if radiance.size and (self.edge_samples > self.samples or self._few_first):
             pixels = crop.pixels(shape[1])
             edge = np.isin(pixels, rim_pixels(self.scene, pose, spotlight))
-            radiance[edge.reshape(crop.height, crop.width)] = self._lit.pixels(pixels[edge], self.edge_samples, seed)
+            samples = max(self.edge_samples, self.samples)
+            radiance[edge.reshape(crop.height, crop.width)] = self._lit.pixels(pixels[edge], samples, seed)
         return Tile(crop, radiance)
+
+    @property
+    def _few_first(self) -> bool:
+        """Whether a pilot of few samples says where all of them are needed."""
+        return self.samples > monte_carlo.PILOT and self.noise > 0.0 and self._lit.tells_noise
 
     def _radiance(self, crop: Crop, seed: int) -> Image:
         """The crop `[h, w, C]` by few samples, and by all of them where few leave too much noise."""
-        few = self.samples <= monte_carlo.PILOT or crop.height == 0 or crop.width == 0
-        if few or not self.noise or not self._lit.tells_noise:
+        if not self._few_first or crop.height == 0 or crop.width == 0:
             return self._lit.render(crop, self.samples, seed)
         radiance, doubt = monte_carlo.mean_and_doubt(self._lit.halves(crop, monte_carlo.PILOT, ~seed), self.noise)
         pixels = crop.pixels(self.scene.camera.shape[1])[doubt.ravel()]
