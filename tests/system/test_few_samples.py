@@ -111,7 +111,7 @@ def test_the_tolerance_is_half_a_level_at_white():
 
 
 def test_a_pixel_that_a_hard_edge_barely_enters_gets_all_samples():
-    """256 stratified samples scatter a mid-edge pixel by 1 % of the step; four that all miss it may be off by a fourth."""
+    """256 stratified samples scatter a mid-edge pixel by 1 % of the step; four that all miss it are off by a fourth."""
     scene = SCENES["hard"].model_copy(update={"camera": Camera(resolution=500)})
     few, many = Renderer(scene, samples=256), Renderer(scene, samples=256, noise=0.0)
     for number, tip in enumerate((TIP, TIP + 0.3, TIP - 0.4)):
