@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from conespot.render import globe, kernel, spectral, wavefront
+from conespot.render.rays import RayGenerator
 from conespot.render.reflectance import Reflectance
 from conespot.render.retina_mesh import retina_mesh
 from conespot.render.retina_sphere import on_sphere, retina_sphere
@@ -66,6 +67,8 @@ class Stage:
         self.transport: wavefront.Transport = "path" if walls is not None else "direct"
         if self._vectorized and walls is None and scene.surface.is_sphere and not shapes:
             self.transport = "unblocked"
+        near = scene.camera.height / 1000.0 if self.transport == "direct" else globe.near_plane(scene)
+        self._rays = RayGenerator(scene.camera, near) if self._vectorized else None
         for group in [[channels[i]] for i in self._seen] if apart else [[channels[i] for i in self._seen]]:
             if not group:
                 continue
@@ -79,7 +82,6 @@ class Stage:
                 everything.update(globe.globe_shapes(mi, scene, walls))
                 depth = walls.bounces + 1
                 integrator = {"type": "path", "max_depth": depth, "rr_depth": depth}
-            near = scene.camera.height / 1000.0 if self.transport == "direct" else globe.near_plane(scene)
             sensor = _sensor(mi, scene, group, samples, near)
             # without the robust test one ray in a million slips between two triangles and leaves its pixel 6 % dark
             settings = {"type": "scene", "embree_use_robust_intersections": True, "integrator": integrator}
@@ -138,9 +140,11 @@ class Stage:
         return image
 
     def _wavefront(self, pixels: NDArray[np.uint32], samples: int, seed: int, halves: bool = False) -> Image:
+        assert self._rays is not None
         self._parameters[0].update()
         return wavefront.trace(
             self._scenes[0],
+            self._rays,
             pixels,
             self._columns,
             samples,

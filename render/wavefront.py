@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from conespot.render import kernel
+from conespot.render.rays import RayGenerator
 
 if TYPE_CHECKING:
     from drjit.auto.ad import Bool
@@ -21,6 +22,7 @@ Transport = Literal["unblocked", "direct", "path"]
 
 def trace(
     loaded: Scene,
+    camera: RayGenerator,
     pixels: NDArray[np.uint32],
     width: int,
     samples: int,
@@ -32,11 +34,11 @@ def trace(
 ) -> NDArray[np.float32]:
     """What the film's channels see `[N, C]` of the pixels `[N]` (row * width + column) of a Mitsuba scene.
 
-    The film must have the frame's first pixel as its crop. Each sample takes a cell of its own of the pixel's area, and
-    one of the film's wavelengths; a pixel's depend on `seed` and its place in the frame, not on the other pixels asked
-    for. Where light that is reflected twice goes depends on those too. Where all wavelengths are alike, `grey` has the
-    integral of each channel's response. With `halves`, `[N, 2, C]`: of each half of the samples, which lie on the
-    pixel's cells like a chequerboard's two colours.
+    Rays are the `camera`'s, wavelengths and channels those of the film of the Mitsuba sensor. Each sample takes a cell
+    of its own of the pixel's area, and one of the film's wavelengths; a pixel's depend on `seed` and its place in the
+    frame, not on the other pixels asked for. Where light that is reflected twice goes depends on those too. Where all
+    wavelengths are alike, `grey` has the integral of each channel's response. With `halves`, `[N, 2, C]`: of each half
+    of the samples, which lie on the pixel's cells like a chequerboard's two colours.
     """
     mi, dr, _ = kernel.load()
     sensor = loaded.sensors()[0]
@@ -60,8 +62,8 @@ def trace(
     # a ray carries four wavelengths, each a quarter of the range from the next: cells of a quarter tell them all apart.
     # Cells of area and of wavelength are paired at random, or colours would lie across the pixel.
     wavelength = (mi.Float(mi.permute_kensler(k, samples, first)) + random.next_float32()) / (4 * samples)
-    # the sensor takes a place in units of its film's crop, which is one pixel
-    ray, weight = sensor.sample_ray_differential(0.0, wavelength, mi.Point2f(x, y), mi.Point2f(0.5))
+    wavelengths, weight = sensor.sample_wavelengths(dr.zeros(mi.SurfaceInteraction3f), wavelength)
+    ray = camera.rays(x, y, wavelengths)
     match transport:
         case "unblocked" | "direct":
             light, met = _lit(loaded, ray, transport == "direct")

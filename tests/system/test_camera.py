@@ -1,9 +1,10 @@
-"""The camera's rays against those that Mitsuba's own sensor casts."""
+"""The camera's rays against those that Mitsuba's own sensor casts, and those that the renderer makes."""
 
 import numpy as np
 import pytest
 
 from conespot.render import kernel
+from conespot.render.rays import RayGenerator
 from conespot.render.stage import Stage
 from conespot.scene import Camera, Scene
 from conespot.scene.retina import UniformRetina
@@ -31,3 +32,19 @@ def test_rays_are_those_of_mitsubas_perspective_sensor(camera):
     offset = origins - rays.origins
     along = np.sum(offset * rays.directions, axis=1, keepdims=True)
     assert np.abs(offset - along * rays.directions).max() < 1e-5
+
+
+@pytest.mark.parametrize("camera", [Camera(), Camera(resolution=64, focal_length=40.0, height=60.0)])
+def test_the_renderers_own_rays_are_the_cameras(camera):
+    """Film positions all over the frame: directions to single precision, 2e-7, and origins on the rays to 1e-5 mm."""
+    mi, dr, kernel_in_use = kernel.load()
+    if not kernel_in_use.vectorized:
+        pytest.skip("the scalar variant has Mitsuba's own sensor")
+    pixels = np.random.default_rng(0).uniform(0.0, camera.shape[::-1], (1000, 2)).astype(np.float32).astype(float)
+    cast = RayGenerator(camera, 90.0).rays(*(mi.Float(part) for part in pixels.T), dr.zeros(mi.Spectrum))
+    rays = camera.rays(pixels)
+    np.testing.assert_allclose(np.array(cast.d).T, rays.directions, rtol=0.0, atol=2e-7)
+    offset = np.array(cast.o).T - rays.origins
+    along = np.sum(offset * rays.directions, axis=1, keepdims=True)
+    assert np.abs(offset - along * rays.directions).max() < 1e-5
+    np.testing.assert_allclose(np.array(cast.o).T[:, 2], camera.height - 90.0, atol=1e-4)
