@@ -10,9 +10,9 @@ from typing import TYPE_CHECKING
 import cv2
 import numpy as np
 
+from conespot.campaigns.maker import made_with, maker
 from conespot.campaigns.plan import Case, Group, Plan, Unit, frame_seed, reference_seed, tile_seed, told
 from conespot.campaigns.row import Finding, Record
-from conespot.campaigns.store import made_with
 from conespot.localize import LocalizationFailure, find_localizer, locate
 from conespot.localize.image import AnyImage, Reference
 from conespot.localize.outcome import Outcome
@@ -39,6 +39,7 @@ class Bench:
 
         cv2.setNumThreads(1)
         kernel.use_threads(1)
+        self._by = maker(kernel.load()[2])
         self._plan = plan
         self._frames = frames
         self._loaded: tuple[str, Renderer, Exposure] | None = None
@@ -73,7 +74,7 @@ class Bench:
                     for tile in tiles:
                         radiance[tile.crop.slices] += np.float32(power) * tile.radiance
                     self._keep(f"{cases[0].frame}-{unit.pose:05d}", cases[0], pose, radiance, image)
-        return Record(unit=unit.key, findings=tuple(findings))
+        return Record(unit=unit.key, by=self._by, findings=tuple(findings))
 
     def _findings(self, unit: Unit, case: Case, image: AnyImage, unlit: Reference | None) -> list[Finding]:
         """What the case's localizers find in a frame."""

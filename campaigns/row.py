@@ -48,9 +48,10 @@ class Finding(Model):
 
 
 class Record(Model):
-    """A finished unit of work: its findings, or the `error` that lost it."""
+    """A finished unit of work: its findings, or the `error` that lost it; `by` is its maker (campaigns.maker)."""
 
     unit: str = Field(max_length=64)
+    by: str = Field("", max_length=500)
     error: str = Field("", max_length=1000)
     findings: tuple[Finding, ...] = ()
 

@@ -11,12 +11,12 @@ from pathlib import Path
 from conespot.campaigns.ending import RunError
 from conespot.campaigns.executor import Executor
 from conespot.campaigns.interruption import interruption
+from conespot.campaigns.maker import Makers, in_a_line, maker
 from conespot.campaigns.plan import Plan, make_plan
 from conespot.campaigns.pool import LocalPool
 from conespot.campaigns.progress import Progress
-from conespot.campaigns.row import Record
 from conespot.campaigns.schema import override, read_campaign
-from conespot.campaigns.store import Store, goes_on, made_with, open_store, read_begun_with
+from conespot.campaigns.store import Store, goes_on, open_store, read_begun_with
 from conespot.scene import InputError
 from conespot.scene.atomic import write_atomically
 from conespot.scene.document import Document
@@ -24,19 +24,19 @@ from conespot.scene.document import Document
 
 @dataclass(frozen=True)
 class Session:
-    """How a session ended: the run folder, the poses that were `lost`, which another session tries again.
+    """How a session ended: the run folder, the errors of poses that were `lost`, which another tries again.
 
     `interrupted` says what is kept if the session was interrupted: then the rows are written and nothing else.
     """
 
     folder: Path
-    lost: tuple[Record, ...] = ()
+    lost: tuple[str, ...] = ()
     interrupted: str = ""
 
     @property
     def sentence(self) -> str:
         """What to say of the poses that were lost."""
-        return f"{len(self.lost)} poses were lost, the first: {self.lost[0].error}; the same command retries them"
+        return f"{len(self.lost)} poses were lost, the first: {self.lost[0]}; the same command retries them"
 
 
 def run_campaign(
@@ -78,11 +78,11 @@ def carry_out(document: Document, out: str | Path | None, executor: Executor) ->
     folder = Path(out or Path("runs") / plan.campaign.name)
     with open_store(folder, plan, document) as store:
         if plan.cases and _measure(plan, store, executor):
-            done = f"{len(store.records)} of {sum(len(g.positions) for g in plan.groups)} poses are kept"
+            done = f"{len(store.entries)} of {sum(len(g.positions) for g in plan.groups)} poses are kept"
             return Session(folder, interrupted=f"interrupted; {done}, and the same command continues the run")
         if plan.campaign.theory:
             _write_theory(folder)
-        lost = tuple(record for record in store.records.values() if record.error)
+        lost = tuple(entry.error for entry in store.entries.values() if entry.error)
     write_results(folder)
     return Session(folder, lost)
 
@@ -107,6 +107,7 @@ def renew_rows(folder: Path) -> None:
         return
     if plan.campaign.made_with.get("identity") == plan.identity:
         with open_store(folder, plan, document) as store:
+            sys.stderr.write("".join(f"{sentence}\n" for sentence in store.damage))
             store.write_rows()
 
 
@@ -115,12 +116,14 @@ def _measure(plan: Plan, store: Store, executor: Executor) -> bool:
 
     Units that were lost before are tried again.
     """
-    left = [u for u in plan.units() if u.key not in store.records or store.records[u.key].error]
+    left = [u for u in plan.units() if u.key not in store.entries or store.entries[u.key].error]
     groups = {unit.key: plan.groups[unit.group] for unit in left}
     progress = Progress(
         sum(group.frames for group in groups.values()), sum(group.work for group in groups.values()), sys.stderr
     )
-    _say_where_it_stands(plan, store, len(left), progress)
+    begun = in_a_line(store.begun_with)
+    makers = Makers(entry.by or begun for entry in store.entries.values())
+    _say_where_it_stands(plan, store, len(left), progress, makers)
     frames = None
     if plan.campaign.frames:
         frames = store.folder / "frames"
@@ -130,7 +133,9 @@ def _measure(plan: Plan, store: Store, executor: Executor) -> bool:
         records = executor.execute(plan, left, frames=frames, note=progress.note)
         try:
             for record in records:
-                store.append(record)
+                kept = store.append(record)
+                if another := makers.meet(kept.by):
+                    progress.note(another)
                 group = groups[record.unit]
                 progress.update(group.frames, group.work, sum(bool(f.reason) for f in record.findings))
         except KeyboardInterrupt:  # in a program that calls `run_campaign`; the command has the flag in its place
@@ -156,13 +161,13 @@ def _write_theory(folder: Path) -> None:
     write_atomically(folder / "theory.csv", "".join(f"{line}\n" for line in lines).encode())
 
 
-def _say_where_it_stands(plan: Plan, store: Store, left: int, progress: Progress) -> None:
+def _say_where_it_stands(plan: Plan, store: Store, left: int, progress: Progress, makers: Makers) -> None:
+    for sentence in store.damage:
+        progress.note(sentence)
     poses = sum(len(group.positions) for group in plan.groups)
     if left < poses:
         progress.note(f"{store.folder}: {poses - left} of {poses} poses are finished, continuing")
     else:
         progress.note(f"{store.folder}: {poses} poses, {plan.frames} frames, {plan.rows} localizations")
-    changed = [k for k, v in made_with(plan).items() if store.begun_with.get(k) != v]
-    if changed and left < poses:
-        before = ", ".join(f"{k} {store.begun_with.get(k)}" for k in changed)
-        progress.note(f"the run was begun with {before}; rows of both are mixed from here on")
+    if left and (another := makers.expect(maker())):
+        progress.note(another)

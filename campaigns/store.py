@@ -1,23 +1,22 @@
 """The run folder: what is finished, safe from a torn write, a second writer and another campaign's rows.
 
 `campaign.yaml` is the campaign as it was resolved, `cases.jsonl` what each of its cases is; both begin the run.
-`journal.jsonl` grows by one line per finished unit, each on the disk before the next; everything else in the folder
-is written whole or not at all, and can be made again from the journal.
+`journal.jsonl` grows by one line per finished unit (conespot.campaigns.journal); everything else in the folder is
+written whole or not at all, and can be made again from the journal. Nothing that was measured is ever deleted.
 """
 
 from __future__ import annotations
 
 import contextlib
-import importlib.metadata
 import io
-import os
-import platform
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import IO
 
 from conespot.campaigns.cases import write_cases
 from conespot.campaigns.ending import RunError
+from conespot.campaigns.journal import FILE, Entry, Journal
+from conespot.campaigns.maker import made_with, maker
 from conespot.campaigns.plan import Plan
 from conespot.campaigns.row import Record, rows
 from conespot.campaigns.schema import resolved
@@ -26,56 +25,52 @@ from conespot.scene.atomic import write_atomically
 from conespot.scene.document import Document, dump, read_document
 from conespot.scene.identity import SCHEMA
 
-_VERSIONS = ("conespot", "mitsuba", "drjit", "numpy", "scipy", "opencv-python-headless", "karellen-llvm-core")
-_LONGEST_LINE = 1_000_000
-
-
-def made_with(plan: Plan) -> dict[str, str]:
-    """What identifies a run and what it is made with: identity and its schema, versions, Python, platform."""
-    versions = {}
-    for package in _VERSIONS:
-        with contextlib.suppress(importlib.metadata.PackageNotFoundError):
-            versions[package] = importlib.metadata.version(package)
-    system = f"{platform.system()} {platform.machine()}"
-    return {
-        "identity": plan.identity,
-        "schema": str(SCHEMA),
-        **versions,
-        "python": platform.python_version(),
-        "platform": system,
-    }
+#: damaged lines that are named one by one
+_MOST_NAMED = 5
 
 
 class Store:
-    """The finished units of a run and the file they are appended to. `begun_with` is what began the run."""
+    """The finished units of a run and the file they are appended to.
 
-    def __init__(self, folder: Path, plan: Plan, journal: IO[bytes], begun_with: dict[str, str]) -> None:
+    `entries` are the units by their key, `begun_with` is what began the run, `damage` names lines of the journal that
+    hold no unit, a sentence each.
+    """
+
+    def __init__(self, folder: Path, plan: Plan, journal: Journal, begun_with: dict[str, str]) -> None:
         self.folder = folder
         self.plan = plan
         self.begun_with = begun_with
+        self.entries: Mapping[str, Entry] = journal.entries
         self._journal = journal
-        self.records = _read_journal(folder / "journal.jsonl", plan, journal)
 
-    def append(self, record: Record) -> None:
-        """Keep a finished unit: it is on the disk when this returns. Raises RunError if the disk refuses."""
-        line = record.model_dump_json(exclude_defaults=True).encode() + b"\n"
+    @property
+    def damage(self) -> list[str]:
+        """The lines of the journal that hold no unit, a sentence each, and how many more there are."""
+        found = self._journal.damage
+        more = len(found) - _MOST_NAMED
+        return [*found[:_MOST_NAMED], *([f"{self._journal.path}: and {more} more such lines"] if more > 0 else [])]
+
+    def append(self, record: Record) -> Record:
+        """Keep a finished unit: it is on the disk when this returns. Raises RunError if the disk refuses.
+
+        What is kept also says who made it: this process, if the record does not say so.
+        """
+        record = record if record.by else record.model_copy(update={"by": maker()})
         try:
-            while line:  # not through a buffer, which would try again when it is closed
-                line = line[os.write(self._journal.fileno(), line) :]
-            os.fsync(self._journal.fileno())
+            self._journal.append(record)
         except OSError as error:
             reason = f"{self.folder}: cannot be written: {error.strerror}"
             raise RunError(f"{reason}; what is finished is kept, and the same command continues the run") from None
-        self.records[record.unit] = record
+        return record
 
     def write_rows(self) -> int:
         """Write errors.csv and errors.parquet of what is finished, in the plan's order; their number of rows."""
-        if not self.records:
+        if not self.entries:
             return 0
         import pandas as pd
 
         columns: dict[str, list[str | float]] = {}
-        for row in rows(self.plan, self.records):
+        for row in rows(self.plan, {record.unit: record for record in self._journal.records()}):
             columns = columns or {name: [] for name in row}
             for name, value in row.items():
                 columns[name].append(value)
@@ -98,7 +93,7 @@ def open_store(folder: Path, plan: Plan, document: Document) -> Iterator[Store]:
     try:
         _refuse_strangers(folder)
         folder.mkdir(parents=True, exist_ok=True)
-        journal = open(folder / "journal.jsonl", "a+b")  # noqa: SIM115 - it must outlive this function
+        journal = open(folder / FILE, "a+b")  # noqa: SIM115 - it must outlive this function
     except OSError as error:
         raise InputError(f"{folder}: cannot be written: {error.strerror}; choose another --out") from None
     with journal:
@@ -116,7 +111,7 @@ def open_store(folder: Path, plan: Plan, document: Document) -> Iterator[Store]:
             raise InputError(f"{folder}: holds the run of another campaign or other settings; choose another --out")
         if plan.cases:
             write_cases(folder, plan)
-        yield Store(folder, plan, journal, begun_with)
+        yield Store(folder, plan, Journal(folder / FILE, plan, journal), begun_with)
 
 
 def _refuse_strangers(folder: Path) -> None:
@@ -126,7 +121,7 @@ def _refuse_strangers(folder: Path) -> None:
         return
     # hidden files may be what an interrupted start left behind
     names = {path.name for path in folder.iterdir() if not path.name.startswith(".")}
-    if "campaign.yaml" not in names and names - {"journal.jsonl"}:
+    if "campaign.yaml" not in names and names - {FILE}:
         raise InputError(f"{folder}: holds other files and is not a run folder; choose another --out")
 
 
@@ -153,32 +148,3 @@ def _lock(journal: IO[bytes], folder: Path) -> None:
         raise InputError(f"{folder}: another `campaign run` is writing to it; wait or choose another --out") from None
     except OSError:
         return  # a network file system without locks
-
-
-def _read_journal(path: Path, plan: Plan, journal: IO[bytes]) -> dict[str, Record]:
-    """The finished units by key. A line torn by a crash, which can only be the last, is cut off.
-
-    Raises InputError for a line that is no unit of the plan: nothing in the file is believed unchecked.
-    """
-    expected: dict[str, list[tuple[str, str]]] = {}
-    for group in plan.groups:
-        answers = sorted((case.key, name) for case in group.cases for name in case.localizers)
-        expected.update((group.unit(i), answers) for i in range(len(group.positions)))
-    records: dict[str, Record] = {}
-    journal.seek(0)
-    number = good = 0
-    while line := journal.readline(_LONGEST_LINE):
-        number += 1
-        if not line.endswith(b"\n") and not journal.read(1):
-            journal.truncate(good)
-            break
-        try:
-            record = Record.model_validate_json(line)
-            answered = sorted((f.case, f.localizer) for f in record.findings)
-            if record.unit not in expected or not (record.error or answered == expected[record.unit]):
-                raise ValueError("not a unit of this campaign")
-        except ValueError:
-            raise InputError(f"{path}:{number}: is no finished unit of this campaign; delete the line") from None
-        records[record.unit] = record
-        good = journal.tell()
-    return records

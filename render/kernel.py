@@ -44,6 +44,11 @@ class Kernel:
         """True for the JIT variants, which trace Python plugins once; False for the scalar fallback."""
         return not self.variant.startswith("scalar")
 
+    @property
+    def llvm_version(self) -> int | None:
+        """Major version of the LLVM library; None if there is none or it cannot tell."""
+        return llvm_version(Path(self.llvm))
+
 
 def llvm_version(library: Path) -> int | None:
     """Major version of an LLVM shared library, from its file name or else by asking it; None if it cannot tell."""

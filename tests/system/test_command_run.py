@@ -124,7 +124,8 @@ def test_an_interrupted_and_a_killed_run_go_on_to_the_same_bytes(folder, straigh
     assert "of 10 poses are finished, continuing" in done.stderr
     assert (run / "errors.csv").read_bytes() == (straight[0] / "errors.csv").read_bytes()
     assert (run / "errors.parquet").read_bytes() == (straight[0] / "errors.parquet").read_bytes()
-    assert (run / "journal.jsonl").read_bytes().count(b"\n") == 10
+    assert f"broken/journal.jsonl:{finished + 2}: was torn before its end" in done.stderr
+    assert (run / "journal.jsonl").read_bytes().count(b"\n") == 10 + 1  # nothing is deleted, not the torn line either
 
 
 def test_a_finished_run_does_nothing_again(folder, straight):

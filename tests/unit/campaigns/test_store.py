@@ -1,11 +1,17 @@
 """campaigns.store: a run folder survives torn writes, strangers and second writers."""
 
+import bisect
 import errno
+import io
+import re
+import zlib
 
 import pandas as pd
 import pytest
 
 from conespot.campaigns.ending import RunError
+from conespot.campaigns.journal import Journal
+from conespot.campaigns.maker import maker
 from conespot.campaigns.plan import make_plan
 from conespot.campaigns.row import Finding, Record
 from conespot.campaigns.schema import read_campaign
@@ -16,6 +22,7 @@ from conespot.scene.document import read_document
 CAMPAIGN = (
     "scene: paper\nposes: 4\nlocalizers: [paper, paper-code]\nsweep: {scene.power.value: [0.5 W, 1 W], seed: [1, 2]}\n"
 )
+PASSED_OVER = "the line is passed over, and its pose runs again"
 
 
 @pytest.fixture
@@ -99,47 +106,107 @@ def test_finished_units_are_found_again(plan, document, run):
     units = list(plan.units())
     fill(plan, document, run, units[:3])
     with open_store(run, plan, document) as store:
-        assert set(store.records) == {u.key for u in units[:3]}
+        assert set(store.entries) == {u.key for u in units[:3]}
 
 
-@pytest.mark.parametrize("tail", [b'{"unit":"', b"\0\0\0\0\0", b'{"unit": "x"}'])
-def test_a_line_torn_by_a_crash_is_cut_off(plan, document, run, tail):
+@pytest.mark.parametrize("tail", [b'{"unit":"', b"\0\0\0\0\0", b'{"unit": "x"}', b'{"crc":"00000000","unit":"x'])
+def test_a_line_torn_by_a_crash_is_named_kept_and_ended_before_the_next(plan, document, run, tail):
     units = list(plan.units())
     whole = fill(plan, document, run, units[:2])
     journal = run / "journal.jsonl"
     kept = journal.read_bytes()
     journal.write_bytes(kept + tail)
     assert fill(plan, document, run, []) == whole
-    assert journal.read_bytes() == kept
+    assert journal.read_bytes() == kept + tail
+    with open_store(run, plan, document) as store:
+        assert store.damage == [f"{journal}:3: was torn before its end; {PASSED_OVER}"]
     fill(plan, document, run, units[2:])
-    assert len(journal.read_bytes().splitlines()) == len(units)
+    assert journal.read_bytes().startswith(kept + tail + b"\n")
+    assert len(journal.read_bytes().splitlines()) == len(units) + 1
+    with open_store(run, plan, document) as store:
+        assert set(store.entries) == {u.key for u in units}
+        assert len(store.damage) == 1
+
+
+def checked(line):
+    """A line as it would stand in a journal, whatever it holds."""
+    return b'{"crc":"%08x",%s\n' % (zlib.crc32(line[1:]), line[1:])
 
 
 @pytest.mark.parametrize(
-    "line",
+    ("line", "wrong"),
     [
-        b"\n",
-        b"not json\n",
-        b"[]\n",
-        b'{"unit":"unknown-0","error":"x"}\n',
-        b'{"unit":"KEY","findings":[]}\n',
-        b'{"unit":"KEY","findings":[{"case":"c","localizer":"paper","reason":"x"}]}\n',
-        b'{"unit":"KEY","error":"x","extra":1}\n',
-        b'{"unit":"KEY","error":"' + b"x" * 2_000_000 + b'"}\n',
-        b"[" * 100_000 + b"\n",
-        b"\xff\xfe\n",
+        (b"\n", "is no line of a journal"),
+        (b"not json\n", "is no line of a journal"),
+        (b"[]\n", "is no line of a journal"),
+        (b"[" * 100_000 + b"\n", "is no line of a journal"),
+        (b"\xff\xfe\n", "is no line of a journal"),
+        (b'{"crc":"00000000","unit":"KEY","error":"x"}\n', "does not match its checksum"),
+        (b'{"unit":"unknown-0","error":"x"}\n', "is no pose of this campaign"),
+        (checked(b'{"unit":"unknown-0","error":"x"}'), "is no pose of this campaign"),
+        (b'{"unit":"KEY0","error":"x"}\n', "is no pose of this campaign"),
+        (b'{"unit":"KEY","findings":[]}\n', "holds no finished pose"),
+        (
+            b'{"unit":"KEY","findings":[{"case":"c","localizer":"paper","reason":"x"}]}\n',
+            "is no pose of this campaign",
+        ),
+        (b'{"unit":"KEY","error":"x","extra":1}\n', "holds no finished pose"),
+        (b'{"unit":"KEY","error":"' + b"x" * 50_000 + b'"}\n', "holds no finished pose"),
+        (b'{"crc":"' + b"x" * 2_000_000 + b'"}\n', "is no line of a journal"),
     ],
 )
-def test_a_line_that_is_no_unit_of_the_campaign_is_refused_with_its_number(plan, document, run, line):
+def test_a_line_that_is_no_unit_of_the_campaign_is_named_and_its_unit_runs_again(plan, document, run, line, wrong):
     units = list(plan.units())
     fill(plan, document, run, units[:1])
     journal = run / "journal.jsonl"
-    journal.write_bytes(journal.read_bytes() + line.replace(b"KEY", units[1].key.encode()))
-    with (
-        pytest.raises(InputError, match=r"journal\.jsonl:2: is no finished unit of this campaign; delete the line"),
-        open_store(run, plan, document),
-    ):
-        pass
+    damaged = journal.read_bytes() + line.replace(b"KEY", units[1].key.encode())
+    journal.write_bytes(damaged)
+    fill(plan, document, run, units[2:])
+    with open_store(run, plan, document) as store:
+        assert store.damage == [f"{journal}:2: {wrong}; {PASSED_OVER}"]
+        assert set(store.entries) == {u.key for u in units} - {units[1].key}
+    assert journal.read_bytes().startswith(damaged)
+
+
+def test_a_bit_flipped_anywhere_in_the_journal_costs_one_pose_and_is_named(tmp_path, plan, document, run):
+    """Every byte of a small journal: the sentence names its line, and the rows come back to the same bytes."""
+    units = list(plan.units())[:3]
+    undisturbed = fill(plan, document, run, units)
+    packed = (run / "errors.parquet").read_bytes()
+    journal = run / "journal.jsonl"
+    whole = journal.read_bytes()
+    starts = [0, *(i + 1 for i in range(len(whole)) if whole[i : i + 1] == b"\n")]
+    for at in range(len(whole)):
+        line = bisect.bisect_right(starts, at)
+        flipped = bytearray(whole)
+        flipped[at] ^= 1 << at % 8
+        opened = Journal(journal, plan, io.BytesIO(flipped))
+        assert set(opened.entries) == {u.key for u in units} - {units[line - 1].key}
+        assert opened.damage[0].startswith(f"{journal}:{line}: ")
+        # an end of a line where there was none makes two of it
+        assert len(opened.damage) == 1 + (flipped[at] == ord("\n"))
+        if at % 149 == 0:
+            journal.write_bytes(flipped)
+            assert fill(plan, document, run, [units[line - 1]]) == undisturbed
+            assert (run / "errors.parquet").read_bytes() == packed
+
+
+def test_lines_of_earlier_versions_without_a_checksum_count(plan, document, run):
+    units = list(plan.units())
+    rows = fill(plan, document, run, units)
+    journal = run / "journal.jsonl"
+    journal.write_bytes(re.sub(rb'"crc":"[0-9a-f]{8}",', b"", journal.read_bytes()))
+    assert fill(plan, document, run, []) == rows
+
+
+def test_every_record_says_what_it_was_made_with(plan, document, run):
+    unit, other = list(plan.units())[:2]
+    with open_store(run, plan, document) as store:
+        store.append(record(plan, unit))
+        store.append(record(plan, other).model_copy(update={"by": "variant scalar_spectral, conespot 0"}))
+    with open_store(run, plan, document) as store:
+        assert store.entries[unit.key].by == maker()
+        assert store.entries[other.key].by == "variant scalar_spectral, conespot 0"
 
 
 def test_a_later_record_of_a_unit_replaces_the_error_before_it(plan, document, run):
@@ -164,7 +231,7 @@ def test_a_full_disk_keeps_what_is_finished(plan, document, run, monkeypatch):
         with pytest.raises(RunError, match="cannot be written: No space left on device; what is finished is kept"):
             store.append(record(plan, units[1]))
         monkeypatch.undo()
-        assert set(store.records) == {units[0].key}
+        assert set(store.entries) == {units[0].key}
 
 
 def test_another_campaigns_folder_is_refused_and_left_alone(tmp_path, plan, document, run):
