@@ -40,6 +40,7 @@ class Bench:
         cv2.setNumThreads(1)
         kernel.use_threads(1)
         self._by = maker(kernel.load()[2])
+        self.variant = kernel.load()[2].variant
         self._plan = plan
         self._frames = frames
         self._loaded: tuple[str, Renderer, Exposure] | None = None

@@ -14,6 +14,8 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
     from pathlib import Path
 
+    from conespot.campaigns.executor import Executor
+    from conespot.campaigns.profile import Profile
     from conespot.scene.document import Document
 
 #: options that set a key of the campaign
@@ -107,6 +109,9 @@ def _parser() -> argparse.ArgumentParser:
         command.add_argument(
             "--workers", metavar="N", type=_workers, default=_cores(), help="processes (default: cores)"
         )
+        where = command.add_mutually_exclusive_group()
+        where.add_argument("--scheduler", metavar="ADDRESS", help="work on the Dask workers of tls://HOST:PORT instead")
+        where.add_argument("--profile", metavar="FILE", help="work on the machines that a YAML file describes instead")
     listed = add("list", _list, "list the shipped campaigns")
     listed.add_argument("--localizers", action="store_true", help="list the localizers in their place")
     add("show", _show, "print a campaign's file").add_argument("campaign")
@@ -162,7 +167,13 @@ def _plan(options: argparse.Namespace) -> Ending:
     from conespot.campaigns.plan import make_plan
     from conespot.campaigns.plan_words import describe
 
-    _say("\n".join(describe(make_plan(_document(options)), options.workers)))
+    profile = _profile(options)
+    workers = profile.workers if profile else options.workers
+    _say("\n".join(describe(make_plan(_document(options)), workers)))
+    if profile is not None and profile.kind != "local" and profile.kind != "scheduler":
+        from conespot.campaigns.cluster import job_script
+
+        _say(f"{profile.jobs} jobs of this script:\n{job_script(profile)}")
     return Ending.DONE
 
 
@@ -170,14 +181,33 @@ def _run(options: argparse.Namespace) -> Ending:
     if options.dry_run:
         return _plan(options)
     document = _document(options)
-    from conespot.campaigns.pool import LocalPool
     from conespot.campaigns.session import carry_out
 
-    session = carry_out(document, options.out, LocalPool(options.workers))
+    session = carry_out(document, options.out, _executor(options))
     if session.interrupted:
         return _complain(session.interrupted, Ending.INTERRUPTED)
     _say_results(session.folder)
     return _complain(session.sentence, Ending.FAILED) if session.lost else Ending.DONE
+
+
+def _profile(options: argparse.Namespace) -> Profile | None:
+    """The machines of the command line; None for the processes of this one."""
+    if not (options.profile or options.scheduler):
+        return None
+    from conespot.campaigns.profile import read_profile, scheduler_at
+
+    return read_profile(options.profile) if options.profile else scheduler_at(options.scheduler)
+
+
+def _executor(options: argparse.Namespace) -> Executor:
+    profile = _profile(options)
+    if profile is not None:
+        from conespot.campaigns.dask_cluster import DaskCluster
+
+        return DaskCluster(profile)
+    from conespot.campaigns.pool import LocalPool
+
+    return LocalPool(options.workers)
 
 
 def _theory(options: argparse.Namespace) -> Ending:

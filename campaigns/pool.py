@@ -5,8 +5,7 @@ A unit whose code raises, or that loses its worker twice, becomes a record with 
 
 from __future__ import annotations
 
-from collections import deque
-from collections.abc import Callable, Generator, Iterable, Iterator, Sequence
+from collections.abc import Callable, Generator, Iterable, Iterator
 from dataclasses import dataclass
 from multiprocessing.connection import wait
 from pathlib import Path
@@ -14,24 +13,23 @@ from typing import assert_never
 
 from conespot.campaigns.ending import RunError
 from conespot.campaigns.interruption import interruption
+from conespot.campaigns.losses import REMEDY, Losses
 from conespot.campaigns.plan import Plan, Unit
 from conespot.campaigns.row import Record
-from conespot.campaigns.worker import Done, Lost, MakeBench, Note, Refused, Worker, make_bench
+from conespot.campaigns.waiting import Waiting
+from conespot.campaigns.worker import POSE_LIMIT_S, Done, Lost, MakeBench, Note, Refused, Worker, make_bench
 
-#: workers lost in a row, with nothing ever finished, after which the machine is to blame and not the units: a unit is
-#: tried twice, so two units that kill whoever takes them, and the machine may still be sound, lose as many
-_HOPELESS = 4
-_REMEDY = "try `campaign doctor`"
 #: how often an interruption is looked for [s]
 _GLANCE = 0.2
 
 
 @dataclass(frozen=True)
 class LocalPool:
-    """An executor: up to that many processes of this machine."""
+    """An executor: up to that many processes of this machine. A pose that takes longer than `limit_s` [s] is lost."""
 
     workers: int = 1
     make: MakeBench = make_bench
+    limit_s: float = POSE_LIMIT_S
 
     def execute(
         self, plan: Plan, units: Iterable[Unit], *, frames: Path | None, note: Callable[[str], None]
@@ -43,55 +41,35 @@ class LocalPool:
         """
         waiting = list(units)
         places = max(1, min(self.workers, len(waiting)))
-        crew = _Crew(plan, waiting, places, note, lambda: Worker(plan, frames, self.make))
+        crew = _Crew(plan, waiting, places, note, lambda: Worker(plan, frames, self.make), self.limit_s)
         try:
             while not interruption.asked and crew.hand_out():
                 for worker in crew.wait():
                     record = crew.hear(worker)
                     if record is not None:
                         yield record
+                yield from crew.lose_the_slow()
         finally:
             crew.end()
-
-
-class _Queue:
-    """Units that wait, by the scene they need."""
-
-    def __init__(self, plan: Plan, units: Iterable[Unit]) -> None:
-        self._plan = plan
-        self._scenes: dict[str, deque[Unit]] = {}
-        for unit in units:
-            self._scenes.setdefault(self.scene(unit), deque()).append(unit)
-
-    def scene(self, unit: Unit) -> str:
-        return self._plan.groups[unit.group].scene_key
-
-    def put_back(self, unit: Unit) -> None:
-        self._scenes.setdefault(self.scene(unit), deque()).appendleft(unit)
-
-    def take(self, loaded: str | None, elsewhere: Sequence[str | None]) -> Unit | None:
-        """The next unit: of the scene that is `loaded`, else of the one that is loaded least `elsewhere`."""
-        if not self._scenes:
-            return None
-        scene = loaded if loaded in self._scenes else min(self._scenes, key=elsewhere.count)
-        unit = self._scenes[scene].popleft()
-        if not self._scenes[scene]:
-            del self._scenes[scene]
-        return unit
 
 
 class _Crew:
     """Workers at their places, what they are busy with, and what became of those that were lost."""
 
     def __init__(
-        self, plan: Plan, units: Iterable[Unit], places: int, note: Callable[[str], None], hire: Callable[[], Worker]
+        self,
+        plan: Plan,
+        units: Iterable[Unit],
+        places: int,
+        note: Callable[[str], None],
+        hire: Callable[[], Worker],
+        limit_s: float,
     ) -> None:
-        self._plan, self._note, self._hire = plan, note, hire
-        self._queue = _Queue(plan, units)
+        self._note, self._hire, self._limit_s = note, hire, limit_s
+        self._waiting = Waiting(plan, units)
+        self._losses = Losses(plan, self._waiting, note)
         self._places: list[Worker | None] = [None] * places
         self._noted: set[str] = set()
-        self._suspects: set[str] = set()
-        self._lost, self._finished = 0, False
 
     def _workers(self) -> Iterator[Worker]:
         return (worker for worker in self._places if worker is not None)
@@ -102,10 +80,10 @@ class _Crew:
             if worker is not None and worker.unit is not None:
                 continue
             elsewhere = [other.scene for other in self._workers() if other is not worker]
-            unit = self._queue.take(worker.scene if worker else None, elsewhere)
-            if unit is not None:
+            scene = self._waiting.next_scene(worker.scene if worker else None, elsewhere)
+            if scene is not None:
                 self._places[i] = worker = worker or self._hire()
-                worker.give(unit, self._queue.scene(unit))
+                worker.give(self._waiting.take(scene)[0], scene)
         return any(worker.unit is not None for worker in self._workers())
 
     def wait(self) -> list[Worker]:
@@ -124,35 +102,34 @@ class _Crew:
                 self._noted.add(sentence)
                 return None
             case Refused(reason):
-                raise RunError(f"{reason}; {_REMEDY}")
+                raise RunError(f"{reason}; {REMEDY}")
             case Done(record, last):
-                self._finished, worker.unit = True, None
+                self._losses.finished, worker.unit = True, None
                 if last:
                     self._dismiss(worker)
                 return record
             case Lost(how):
-                return self._give_up_or_try_again(worker, how)
+                return self._lose(worker, how)
             case never:
                 assert_never(never)
 
-    def _give_up_or_try_again(self, worker: Worker, how: str) -> Record | None:
-        self._lost += 1
-        if self._lost == _HOPELESS and not self._finished:
-            raise RunError(f"no worker lives to finish anything, the last {how}; {_REMEDY}")
-        unit, worker.unit = worker.unit, None
-        self._dismiss(worker)
-        assert unit is not None, "only busy workers are heard"
-        if unit.key in self._suspects:
-            self._note(f"a worker {how} at {self._plan.says(unit)} again; its frames are recorded as failed")
-            return Record(unit=unit.key, error=f"the worker {how}, twice")
-        self._note(f"a worker {how} at {self._plan.says(unit)}; trying that pose once more")
-        self._suspects.add(unit.key)
-        self._queue.put_back(unit)
-        return None
+    def lose_the_slow(self) -> Iterator[Record]:
+        """Stop the workers whose pose takes too long, as if they had died of it; records of what is given up."""
+        for worker in self._workers():
+            if worker.unit is not None and worker.since > self._limit_s:
+                record = self._lose(worker, f"took longer than {self._limit_s:g} s", at_once=True)
+                if record is not None:
+                    yield record
 
-    def _dismiss(self, worker: Worker) -> None:
+    def _lose(self, worker: Worker, how: str, at_once: bool = False) -> Record | None:
+        unit, worker.unit = worker.unit, None
+        self._dismiss(worker, at_once)
+        assert unit is not None, "only busy workers are heard"
+        return self._losses.lost([unit], how)
+
+    def _dismiss(self, worker: Worker, at_once: bool = False) -> None:
         self._places[self._places.index(worker)] = None
-        worker.end()
+        worker.end(at_once)
 
     def end(self) -> None:
         """Stop everybody, at once who is busy."""

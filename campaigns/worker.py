@@ -10,6 +10,7 @@ import multiprocessing
 import os
 import signal
 import threading
+import time
 import traceback
 import warnings
 from collections.abc import Callable, Iterator
@@ -33,12 +34,19 @@ class Measures(Protocol):
     """What a worker does with a unit; `campaigns.bench.Bench` but in tests."""
 
     @property
+    def variant(self) -> str:
+        """The Mitsuba variant it renders with."""
+
+    @property
     def worn(self) -> bool:
         """True when its process should be replaced before the next unit."""
 
     def measure(self, unit: Unit) -> Record:
         """The unit's record."""
 
+
+#: after which a pose hangs [s]: the slowest that was ever measured, of 4000 px on the scalar variant, takes minutes
+POSE_LIMIT_S = 3600.0
 
 #: makes what measures, in the worker's own process
 MakeBench = Callable[[Plan, Path | None], Measures]
@@ -91,6 +99,7 @@ class Worker:
         self.connection, theirs = context.Pipe()
         self.unit: Unit | None = None
         self.scene: str | None = None
+        self._given = time.monotonic()
         self._process = context.Process(target=_work, args=(theirs, plan, frames, make), daemon=True)
         with _born():
             self._process.start()
@@ -98,10 +107,15 @@ class Worker:
 
     def give(self, unit: Unit, scene: str) -> None:
         """Send a unit of a scene."""
-        self.unit, self.scene = unit, scene
+        self.unit, self.scene, self._given = unit, scene, time.monotonic()
         # a dead worker is found when its answer is awaited
         with contextlib.suppress(OSError):
             self.connection.send(unit)
+
+    @property
+    def since(self) -> float:
+        """How long ago it was given its unit [s]."""
+        return time.monotonic() - self._given
 
     def hear(self) -> Message:
         """What it says next; waits for it."""
@@ -134,23 +148,33 @@ def _work(connection: Connection, plan: Plan, frames: Path | None, make: MakeBen
     threading.Thread(target=_end_with_parent, daemon=True).start()
     with contextlib.suppress(EOFError, OSError):
         try:
-            with warnings.catch_warnings(record=True) as caught:
-                bench = make(plan, frames)
+            bench, sentences = made(make, plan, frames)
         except Exception as error:
             connection.send(Refused(f"cannot render: {error}"))
             return
-        for warning in caught:
-            if issubclass(warning.category, RuntimeWarning):
-                connection.send(Note(str(warning.message)))
+        for sentence in sentences:
+            connection.send(Note(sentence))
         last = False
         while not last:
             unit = connection.recv()
-            try:
-                record = bench.measure(unit)
-            except Exception as error:
-                record = Record(unit=unit.key, error=_sentence(error))
+            record = measured(bench, unit)
             last = bench.worn
             connection.send(Done(record, last))
+
+
+def made(make: MakeBench, plan: Plan, frames: Path | None) -> tuple[Measures, list[str]]:
+    """What measures, and what it warns of."""
+    with warnings.catch_warnings(record=True) as caught:
+        bench = make(plan, frames)
+    return bench, [str(warning.message) for warning in caught if issubclass(warning.category, RuntimeWarning)]
+
+
+def measured(bench: Measures, unit: Unit) -> Record:
+    """The unit's record, which holds an error if its code raises."""
+    try:
+        return bench.measure(unit)
+    except Exception as error:
+        return Record(unit=unit.key, error=_sentence(error))
 
 
 def _end_with_parent() -> None:

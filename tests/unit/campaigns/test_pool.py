@@ -12,6 +12,7 @@ from conespot.campaigns.plan import make_plan
 from conespot.campaigns.pool import LocalPool
 from conespot.campaigns.row import Finding, Record
 from conespot.campaigns.schema import read_campaign
+from conespot.campaigns.worker import Worker
 
 
 class FakeBench:
@@ -30,6 +31,8 @@ class FakeBench:
         (self.folder / f"did-{os.getpid()}-{unit.key}").touch()
         if what == "dies" or (what == "dies-once" and first):
             os.kill(os.getpid(), signal.SIGKILL)
+        if what == "hangs":
+            time.sleep(3600)
         if what == "exits":
             os._exit(3)
         if what == "raises":
@@ -65,10 +68,10 @@ def plan(tmp_path):
     return make_plan(read_campaign(str(tmp_path / "c.yaml")))
 
 
-def do(plan, tmp_path, workers=2, make=lives, script=""):
+def do(plan, tmp_path, workers=2, make=lives, script="", limit_s=3600.0):
     (tmp_path / "script").write_text(script)
     notes = []
-    pool = LocalPool(workers, make)
+    pool = LocalPool(workers, make, limit_s)
     records = {r.unit: r for r in pool.execute(plan, plan.units(), frames=tmp_path, note=notes.append)}
     return records, notes
 
@@ -120,6 +123,20 @@ def test_a_unit_that_kills_two_workers_is_given_up_and_no_other(plan, tmp_path, 
     assert len(records) == 12
     assert errors(plan, records) == {0: f"the worker {says}, twice", 4: f"the worker {says}, twice"}
     assert len(notes) == 4
+
+
+def test_a_pose_that_hangs_is_stopped_tried_once_more_and_given_up(plan, tmp_path, monkeypatch):
+    group = plan.groups[0].key
+
+    def since(worker):
+        """No time passes but for the one who hangs, so that nobody is slow under load."""
+        return 3601.0 if worker.unit.key == f"{group}-4" and (tmp_path / f"tried-{worker.unit.key}").exists() else 0.0
+
+    monkeypatch.setattr(Worker, "since", property(since))
+    records, notes = do(plan, tmp_path, script="4 hangs")
+    assert len(records) == 12
+    assert errors(plan, records) == {4: "the worker took longer than 3600 s, twice"}
+    assert len(notes) == 2
 
 
 def test_a_worn_worker_makes_room_for_a_fresh_one(plan, tmp_path):
