@@ -16,7 +16,8 @@ if TYPE_CHECKING:
     from conespot.campaigns.plan import Plan
     from conespot.render.kernel import Kernel
 
-_PACKAGES = ("conespot", "mitsuba", "drjit", "numpy", "scipy", "opencv-python-headless", "karellen-llvm-core")
+#: all that an answer may depend on
+PACKAGES = ("conespot", "mitsuba", "drjit", "numpy", "scipy", "opencv-python-headless", "karellen-llvm-core")
 _BETWEEN = ", "
 
 
@@ -80,7 +81,7 @@ class Makers:
 @functools.cache
 def _versions() -> dict[str, str]:
     versions = {}
-    for package in _PACKAGES:
+    for package in PACKAGES:
         with contextlib.suppress(importlib.metadata.PackageNotFoundError):
             versions[package] = importlib.metadata.version(package)
     return versions | {"python": platform.python_version(), "platform": f"{platform.system()} {platform.machine()}"}

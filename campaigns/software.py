@@ -10,8 +10,7 @@ import os
 from pathlib import Path
 
 import conespot
-
-_PACKAGES = ("conespot", "mitsuba", "drjit", "numpy", "scipy", "opencv-python-headless", "karellen-llvm-core")
+from conespot.campaigns.maker import PACKAGES
 
 
 @functools.cache
@@ -21,7 +20,7 @@ def software() -> dict[str, str]:
     Two checkouts may state the same version and be different programs, which the digest tells.
     """
     found = {}
-    for package in _PACKAGES:
+    for package in PACKAGES:
         with contextlib.suppress(importlib.metadata.PackageNotFoundError):
             found[package] = importlib.metadata.version(package)
     return found | {"conespot source": _source_digest(Path(conespot.__file__).parent)}
