@@ -7,9 +7,9 @@ import functools
 import hashlib
 import importlib.metadata
 import os
+from importlib import resources
 from pathlib import Path
 
-import conespot
 from conespot.campaigns.maker import PACKAGES
 
 
@@ -23,7 +23,7 @@ def software() -> dict[str, str]:
     for package in PACKAGES:
         with contextlib.suppress(importlib.metadata.PackageNotFoundError):
             found[package] = importlib.metadata.version(package)
-    return found | {"conespot source": _source_digest(Path(conespot.__file__).parent)}
+    return found | {"conespot source": _source_digest(Path(str(resources.files("conespot"))))}
 
 
 def _source_digest(root: Path) -> str:
