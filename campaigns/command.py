@@ -14,8 +14,6 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
     from pathlib import Path
 
-    from conespot.campaigns.executor import Executor
-    from conespot.campaigns.profile import Profile
     from conespot.scene.document import Document
 
 #: options that set a key of the campaign
@@ -72,6 +70,8 @@ def _parser() -> argparse.ArgumentParser:
     import argparse
     from pathlib import Path
 
+    from conespot.campaigns.machines import add_machines
+
     parser = argparse.ArgumentParser(
         prog="campaign",
         description="Render spotlights on a retina, localize the instrument that carries them, compare with the truth.",
@@ -104,39 +104,24 @@ def _parser() -> argparse.ArgumentParser:
             command.add_argument(f"--{name}", metavar=metavar, help=text)
     run.add_argument("--dry-run", action="store_true", help="only say what the run would do")
     run.add_argument("--out", metavar="FOLDER", help="the run folder (default: runs/NAME)")
+    run.add_argument("--shard", metavar="I/N", help="only this share of the poses, into a folder that `merge` reads")
     theory.add_argument("--out", metavar="FOLDER", help="where to write (default: runs/theory-SCENE)")
     for command in (run, plan):
-        command.add_argument(
-            "--workers", metavar="N", type=_workers, default=_cores(), help="processes (default: cores)"
-        )
-        where = command.add_mutually_exclusive_group()
-        where.add_argument("--scheduler", metavar="ADDRESS", help="work on the Dask workers of tls://HOST:PORT instead")
-        where.add_argument("--profile", metavar="FILE", help="work on the machines that a YAML file describes instead")
+        add_machines(command)
     listed = add("list", _list, "list the shipped campaigns")
     listed.add_argument("--localizers", action="store_true", help="list the localizers in their place")
     add("show", _show, "print a campaign's file").add_argument("campaign")
     report = add("report", _report, "make the tables, figures and report of a run folder again")
     report.add_argument("folder", type=Path, metavar="RUN")
+    merge = add("merge", _merge, "make one run folder of those of a campaign's shards")
+    merge.add_argument("out", type=Path, metavar="OUT")
+    merge.add_argument("folders", type=Path, nargs="+", metavar="SHARD")
     compare = add("compare", _compare, "compare two lights pose by pose, in one run or several")
     compare.add_argument("folders", type=Path, nargs="+", metavar="RUN")
     compare.add_argument("--lights", metavar="A,B", help="reference and other light (default: the first against all)")
     doctor = add("doctor", _doctor, "say what this machine renders with, and prove it")
     doctor.add_argument("--clear-cache", action="store_true", help="remove the backgrounds kept between runs instead")
     return parser
-
-
-def _workers(text: str) -> int:
-    import argparse
-
-    count = int(text) if text.isdecimal() else 0
-    if not 1 <= count <= 1024:
-        raise argparse.ArgumentTypeError("must be a whole number from 1 to 1024")
-    return count
-
-
-def _cores() -> int:
-    # a cluster gives a job fewer cores than the machine has
-    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
 def _document(options: argparse.Namespace) -> Document:
@@ -164,16 +149,14 @@ def _validate(options: argparse.Namespace) -> Ending:
 
 
 def _plan(options: argparse.Namespace) -> Ending:
+    from conespot.campaigns.machines import jobs_in_words, profile_of
     from conespot.campaigns.plan import make_plan
     from conespot.campaigns.plan_words import describe
 
-    profile = _profile(options)
-    workers = profile.workers if profile else options.workers
-    _say("\n".join(describe(make_plan(_document(options)), workers)))
-    if profile is not None and profile.kind != "local" and profile.kind != "scheduler":
-        from conespot.campaigns.cluster import job_script
-
-        _say(f"{profile.jobs} jobs of this script:\n{job_script(profile)}")
+    profile = profile_of(options)
+    _say("\n".join(describe(make_plan(_document(options)), profile.workers if profile else options.workers)))
+    if jobs := jobs_in_words(profile):
+        _say(jobs)
     return Ending.DONE
 
 
@@ -181,33 +164,14 @@ def _run(options: argparse.Namespace) -> Ending:
     if options.dry_run:
         return _plan(options)
     document = _document(options)
+    from conespot.campaigns.machines import executor_of, shard_of
     from conespot.campaigns.session import carry_out
 
-    session = carry_out(document, options.out, _executor(options))
+    session = carry_out(document, options.out, executor_of(options), shard_of(options))
     if session.interrupted:
         return _complain(session.interrupted, Ending.INTERRUPTED)
     _say_results(session.folder)
     return _complain(session.sentence, Ending.FAILED) if session.lost else Ending.DONE
-
-
-def _profile(options: argparse.Namespace) -> Profile | None:
-    """The machines of the command line; None for the processes of this one."""
-    if not (options.profile or options.scheduler):
-        return None
-    from conespot.campaigns.profile import read_profile, scheduler_at
-
-    return read_profile(options.profile) if options.profile else scheduler_at(options.scheduler)
-
-
-def _executor(options: argparse.Namespace) -> Executor:
-    profile = _profile(options)
-    if profile is not None:
-        from conespot.campaigns.dask_cluster import DaskCluster
-
-        return DaskCluster(profile)
-    from conespot.campaigns.pool import LocalPool
-
-    return LocalPool(options.workers)
 
 
 def _theory(options: argparse.Namespace) -> Ending:
@@ -227,6 +191,18 @@ def _report(options: argparse.Namespace) -> Ending:
     write_results(options.folder)
     _say_results(options.folder)
     return Ending.DONE
+
+
+def _merge(options: argparse.Namespace) -> Ending:
+    from conespot.campaigns.merge import merge
+    from conespot.results import write_results
+
+    merged = merge(options.out, options.folders)
+    for sentence in merged.damage:
+        _complain(sentence, Ending.FAILED)
+    write_results(options.out)
+    _say_results(options.out)
+    return _complain(merged.sentence, Ending.FAILED) if merged.missing else Ending.DONE
 
 
 def _compare(options: argparse.Namespace) -> Ending:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import sys
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -12,10 +12,11 @@ from conespot.campaigns.ending import RunError
 from conespot.campaigns.executor import Executor
 from conespot.campaigns.interruption import interruption
 from conespot.campaigns.maker import Makers, in_a_line, maker
-from conespot.campaigns.plan import Plan, make_plan
+from conespot.campaigns.plan import Plan, Unit, make_plan
 from conespot.campaigns.pool import LocalPool
 from conespot.campaigns.progress import Progress
 from conespot.campaigns.schema import override, read_campaign
+from conespot.campaigns.shard import Shard
 from conespot.campaigns.store import Store, goes_on, open_store, read_begun_with
 from conespot.scene import InputError
 from conespot.scene.atomic import write_atomically
@@ -67,18 +68,21 @@ def run_campaign(
     return session.folder
 
 
-def carry_out(document: Document, out: str | Path | None, executor: Executor) -> Session:
+def carry_out(document: Document, out: str | Path | None, executor: Executor, shard: Shard | None = None) -> Session:
     """Do what is left of a campaign and write what its folder holds: rows, theory, tables, figures, report.
 
+    Of a `shard` its poses alone, by default into a folder that is named after it.
     Raises as `run_campaign` does, but for poses that were lost and for interruptions while poses are measured.
     """
     from conespot.results import write_results
 
     plan = make_plan(document)
-    folder = Path(out or Path("runs") / plan.campaign.name)
+    units = shard.units(plan) if shard and plan.cases else list(plan.units())
+    name = plan.campaign.name + (f"-{shard.number}-of-{shard.count}" if shard else "")
+    folder = Path(out or Path("runs") / name)
     with open_store(folder, plan, document) as store:
-        if plan.cases and _measure(plan, store, executor):
-            done = f"{len(store.entries)} of {sum(len(g.positions) for g in plan.groups)} poses are kept"
+        if plan.cases and _measure(plan, store, executor, units):
+            done = f"{len(store.entries)} of {len(units)} poses are kept"
             return Session(folder, interrupted=f"interrupted; {done}, and the same command continues the run")
         if plan.campaign.theory:
             _write_theory(folder)
@@ -111,19 +115,19 @@ def renew_rows(folder: Path) -> None:
             store.write_rows()
 
 
-def _measure(plan: Plan, store: Store, executor: Executor) -> bool:
-    """Do what is left, then write the rows of all that is finished; True when it was interrupted.
+def _measure(plan: Plan, store: Store, executor: Executor, units: Sequence[Unit]) -> bool:
+    """Do what is left of the units, then write the rows of all that is finished; True when it was interrupted.
 
     Units that were lost before are tried again.
     """
-    left = [u for u in plan.units() if u.key not in store.entries or store.entries[u.key].error]
+    left = [u for u in units if u.key not in store.entries or store.entries[u.key].error]
     groups = {unit.key: plan.groups[unit.group] for unit in left}
     progress = Progress(
         sum(group.frames for group in groups.values()), sum(group.work for group in groups.values()), sys.stderr
     )
     begun = in_a_line(store.begun_with)
     makers = Makers(entry.by or begun for entry in store.entries.values())
-    _say_where_it_stands(plan, store, len(left), progress, makers)
+    _say_where_it_stands(store, units, len(left), progress, makers)
     frames = None
     if plan.campaign.frames:
         frames = store.folder / "frames"
@@ -161,13 +165,15 @@ def _write_theory(folder: Path) -> None:
     write_atomically(folder / "theory.csv", "".join(f"{line}\n" for line in lines).encode())
 
 
-def _say_where_it_stands(plan: Plan, store: Store, left: int, progress: Progress, makers: Makers) -> None:
+def _say_where_it_stands(store: Store, units: Sequence[Unit], left: int, progress: Progress, makers: Makers) -> None:
     for sentence in store.damage:
         progress.note(sentence)
-    poses = sum(len(group.positions) for group in plan.groups)
+    poses = len(units)
     if left < poses:
         progress.note(f"{store.folder}: {poses - left} of {poses} poses are finished, continuing")
     else:
-        progress.note(f"{store.folder}: {poses} poses, {plan.frames} frames, {plan.rows} localizations")
+        groups = [store.plan.groups[unit.group] for unit in units]
+        frames, rows = sum(group.frames for group in groups), sum(group.rows for group in groups)
+        progress.note(f"{store.folder}: {poses} poses, {frames} frames, {rows} localizations")
     if left and (another := makers.expect(maker())):
         progress.note(another)

@@ -63,6 +63,10 @@ class Store:
             raise RunError(f"{reason}; what is finished is kept, and the same command continues the run") from None
         return record
 
+    def record(self, unit: str) -> Record:
+        """The record of a finished unit. Raises KeyError for one that is not finished."""
+        return self._journal.record(unit)
+
     def write_rows(self) -> int:
         """Write errors.csv and errors.parquet of what is finished, in the plan's order; their number of rows."""
         if not self.entries:

@@ -5,7 +5,7 @@ import contextlib
 import pytest
 from distributed import LocalCluster
 
-from conespot.campaigns import dask_cluster
+from conespot.campaigns import dask_cluster, dask_crew
 from conespot.campaigns.dask_cluster import DaskCluster
 from conespot.campaigns.ending import RunError
 from conespot.campaigns.plan import make_plan
@@ -96,7 +96,7 @@ def test_workers_that_cannot_render_end_the_run_with_their_reason(plan, schedule
 
 
 def test_workers_of_other_software_or_another_variant_are_refused_by_name(plan, scheduler, monkeypatch):
-    monkeypatch.setattr(dask_cluster, "software", lambda: {"mitsuba": "0.6"})
+    monkeypatch.setattr(dask_crew, "software", lambda: {"mitsuba": "0.6"})
     with pytest.raises(RunError, match=r"no worker can be used; inproc://.*: it has mitsuba 3\.[\d.]+, not 0\.6; try"):
         do(plan, scheduler)
     monkeypatch.undo()
