@@ -61,9 +61,7 @@ def client_of(profile: Profile) -> Iterator[Client]:
                 case never:
                     assert_never(never)
             tls = None if isinstance(profile, LocalMachine) else profile.tls
-            client = stack.enter_context(
-                Client(where, security=_security(tls), timeout=_PATIENCE, set_as_default=False)
-            )
+            client = stack.enter_context(Client(where, security=security(tls), timeout=_PATIENCE, set_as_default=False))
         except (OSError, RuntimeError, ValueError, TypeError) as error:
             what = profile.address if isinstance(profile, Scheduler) else profile.kind
             said = " ".join(str(error).split())[:300] or type(error).__name__
@@ -117,7 +115,7 @@ def _submitter(profile: Jobs) -> JobQueueCluster:
         "log_directory": profile.log_directory,
         "job_extra_directives": list(profile.job_extra_directives),
         "job_script_prologue": prologue,
-        "security": _security(profile.tls),
+        "security": security(profile.tls),
         "scheduler_options": {"dashboard_address": "127.0.0.1:0"},
     }
     options |= {k: v for k, v in {"queue": profile.queue, "account": profile.account}.items() if v is not None}
@@ -131,8 +129,8 @@ def _submitter(profile: Jobs) -> JobQueueCluster:
     return cluster
 
 
-def _security(tls: Tls | None) -> Security | None:
-    """What the profile states; without that, Dask's own configuration has its say."""
+def security(tls: Tls | None) -> Security | None:
+    """The certificates that a profile states; without that, Dask's own configuration has its say."""
     if tls is None:
         return None
     from distributed import Security
