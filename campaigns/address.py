@@ -15,7 +15,7 @@ from conespot.scene import Scene
 from conespot.scene.identity import essence, identity
 
 #: keys of a campaign that change nothing in what it finds, those that do so for some of its cases, and how they change
-_NOTHING = {"name", "description", "made_with"}
+_NOTHING = {"name", "description", "expect", "made_with"}
 _WHOLE = {"theory", "bounds", "frames"}
 _FOUND = {"localizers", "knowledge"}  #: but no frame
 _LOADED = {"scene", "samples", "edge_samples"}  #: before there is a pose

@@ -119,6 +119,11 @@ def _parser() -> argparse.ArgumentParser:
     compare = add("compare", _compare, "compare two lights pose by pose, in one run or several")
     compare.add_argument("folders", type=Path, nargs="+", metavar="RUN")
     compare.add_argument("--lights", metavar="A,B", help="reference and other light (default: the first against all)")
+    check = add("check", _check, "compare a run with what its campaign expects (`expect:`); exit code 1 for a miss")
+    check.add_argument("folder", type=Path, metavar="RUN")
+    check.add_argument("--campaign", metavar="FILE", help="expect what this campaign does (default: the run's own)")
+    check.add_argument("--junit", type=Path, metavar="FILE", help="write the verdicts as JUnit XML")
+    check.add_argument("--markdown", type=Path, metavar="FILE", help="write the verdicts as a markdown table")
     doctor = add("doctor", _doctor, "say what this machine renders with, and prove it")
     doctor.add_argument("--clear-cache", action="store_true", help="remove the backgrounds kept between runs instead")
     return parser
@@ -211,6 +216,14 @@ def _compare(options: argparse.Namespace) -> Ending:
     _say(compare(options.folders, options.lights))
     _say(f"{options.folders[0]}: comparison.txt, tables/comparison.csv, figures/comparison_*")
     return Ending.DONE
+
+
+def _check(options: argparse.Namespace) -> Ending:
+    from conespot.campaigns.check import check_run
+
+    checked = check_run(options.folder, options.campaign, options.junit, options.markdown)
+    _say(checked.text)
+    return _complain(f"{checked.missed} expectations missed", Ending.FAILED) if checked.missed else Ending.DONE
 
 
 def _say_results(folder: Path) -> None:

@@ -16,6 +16,7 @@ from typing import Annotated, Any, Literal
 from pydantic import BeforeValidator, Field
 
 from conespot.campaigns.knowledge import Knowledge
+from conespot.results.expectation import Expectations
 from conespot.scene import InputError, Scene
 from conespot.scene.document import Document, Path_, find_document, merge, read_document, read_value
 from conespot.scene.model import Model, unknown_name
@@ -69,6 +70,7 @@ class Campaign(Model):
     seed: int = Field(1, ge=0, lt=2**63, strict=True)
     bounds: bool = Field(False, strict=True)  #: state the Cramer-Rao bound beside what the estimators find
     frames: bool = Field(False, strict=True)  #: keep every frame as EXR and PNG
+    expect: Expectations = ()  #: of the tables, see `campaign check`; no row depends on it
     made_with: dict[str, str] = Field({})  #: written by a run: versions, Python, platform; means nothing when read
 
 

@@ -6,6 +6,7 @@ from collections.abc import Callable
 
 import pandas as pd
 
+from conespot.results.check import expectation_table
 from conespot.results.error_tables import ERROR_TABLES, POWER, cells
 from conespot.results.precision import precision_table
 from conespot.results.released import released_table
@@ -20,6 +21,7 @@ _LAST: dict[str, Callable[[Run], Table | None]] = {
     "precision": precision_table,
     "white": white_table,
     "released": released_table,
+    "expectations": expectation_table,
 }
 
 #: every table there can be: tables/NAME.csv
@@ -27,7 +29,7 @@ TABLE_NAMES = (*_FIRST, *(kind.name for kind in ERROR_TABLES), *_LAST)
 
 
 def make_tables(run: Run, boxes: pd.DataFrame | None) -> list[Table]:
-    """Every table that the run has rows for: I, IV, V, errors by power, precision, white level, released estimates."""
+    """Every table that the run has rows for, I, IV, V, errors by power and more, and what its campaign expects."""
     first, last = ({name: make(run) for name, make in some.items()} for some in (_FIRST, _LAST))
     of_errors: list[Table | None] = []
     if run.rows is not None and boxes is not None:

@@ -42,7 +42,7 @@ def split(frame: pd.DataFrame, group: Sequence[str]) -> list[tuple[Variant, pd.D
     taken: set[str] = set()
     for values, part in frame.groupby(names, sort=True):
         setting = dict(zip(names, values, strict=True))
-        label = ", ".join(_named(name, setting[name]) for name in telling)
+        label = ", ".join(named(name, setting[name]) for name in telling)
         slug = re.sub(r"[^A-Za-z0-9.+]+", "-", label).strip("-.")[:100]
         if slug.lower() in taken or not slug:  # labels that differ in punctuation, case or their far end only
             slug = f"{slug}-{len(found) + 1}".lstrip("-")
@@ -71,7 +71,8 @@ def by_axes(frame: pd.DataFrame) -> Iterator[tuple[dict[str, Any], pd.DataFrame]
         yield dict(zip(AXES, key, strict=True)), parts[key]
 
 
-def _named(name: str, value: Any) -> str:
+def named(name: str, value: Any) -> str:
+    """The value of a column in words: with its unit, or with the name of a swept key."""
     text = f"{value:g}" if isinstance(value, float) else str(value)
     if name not in SETTING:
         return f"{name.removeprefix('scene.')} {text}"
