@@ -25,6 +25,7 @@ UNITS: dict[str, dict[str, float]] = {
     "irradiance": {"W/m2": 1.0, "mW/m2": 1e-3, "mW/cm2": 10.0, "uW/cm2": 1e-2},
     "pixels": {"px": 1.0},
     "time": {"s": 1.0, "ms": 1e-3, "us": 1e-6},
+    "refraction": {"D": 1.0},
 }
 #: the unit a quantity is written back with
 WRITTEN = {
@@ -36,6 +37,7 @@ WRITTEN = {
     "irradiance": "W/m2",
     "pixels": "px",
     "time": "s",
+    "refraction": "D",
 }
 _QUANTITY = re.compile(r"\s*([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)\s*([A-Za-z/0-9]+)\s*", re.ASCII)
 
@@ -102,6 +104,7 @@ if TYPE_CHECKING:
     Radiance = float
     Irradiance = float
     Seconds = float
+    Dioptres = float
 else:
     Length = _quantity("length")  #: [mm]
     Angle = _quantity("angle")  #: [rad]
@@ -110,3 +113,4 @@ else:
     Radiance = _quantity("radiance")  #: [W m-2 sr-1]
     Irradiance = _quantity("irradiance")  #: [W m-2]
     Seconds = _quantity("time")  #: [s]
+    Dioptres = _quantity("refraction")  #: [1/m]
