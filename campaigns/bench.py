@@ -131,17 +131,26 @@ class Bench:
         return ambient.reference()
 
     def _tiles(self, renderer: Renderer, unit: Unit) -> list[Tile]:
+        """What all spotlights send back at 1 W: added up once for all powers, so one tile, or none."""
+        from conespot.render import merged
+
         group = self._plan.groups[unit.group]
         pose = group.pose(unit.pose)
-        return [renderer.tile(pose, k, tile_seed(self._plan, unit, k)) for k in range(len(group.scene.spotlights))]
+        seeds = [tile_seed(self._plan, unit, k) for k in range(len(group.scene.spotlights))]
+        tiles = [renderer.tile(pose, k, seed) for k, seed in enumerate(seeds)]
+        lit = [tile for tile in tiles if tile.radiance.size]
+        return [merged(lit)] if lit else []
 
     def _scene(self, group: Group) -> tuple[Renderer, Exposure]:
         if self._loaded is None or self._loaded[0] != group.scene_key:
             from conespot.render import Exposure, Renderer
 
-            self._loaded = None  # the old scene goes before the new one comes
+            # the old scene goes before the new one comes, but for its background, which may be the new one's too
+            held = self._loaded and self._loaded[1].background()
+            self._loaded = None
             renderer = Renderer(group.scene, samples=group.samples, edge_samples=group.edge_samples)
             exposure = Exposure(renderer.background(), group.scene.sensor)
+            del held
             if exposure.meters_once:
                 exposure = Exposure(renderer.background(), self._metered(group, renderer, exposure))
             self._loaded = group.scene_key, renderer, exposure

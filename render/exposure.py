@@ -18,6 +18,10 @@ from conespot.scene.sensor import Linear, Sensor, Srgb8
 
 #: of the table of sRGB values, fine enough that few hold two of them
 _BINS = 2**16
+#: in place of a value
+_UNKNOWN = 256
+#: pixels worked on at once: what comes between stays in a processor's second cache
+_AT_ONCE = 2**15
 
 Pixels = NDArray[np.uint8] | NDArray[np.uint16]
 
@@ -27,33 +31,36 @@ def encode(radiance: NDArray[np.floating[Any]], sensor: Srgb8 | Linear) -> Pixel
 
     `srgb8` follows IEC 61966-2-1; `linear` is proportional.
     """
-    relative = np.clip(radiance / np.float32(sensor.white), 0.0, 1.0)
-    match sensor:
-        case Srgb8():
-            return _srgb8(np.asarray(relative, np.float32))
-        case Linear():
-            values = np.floor(relative * sensor.full_scale + 0.5)
-            return values.astype(np.uint8) if sensor.full_scale <= 255 else values.astype(np.uint16)
-        case unknown:
-            assert_never(unknown)
+    flat = radiance.reshape(-1)
+    values = np.empty(flat.shape, np.uint8 if sensor.full_scale <= 255 else np.uint16)
+    for first in range(0, len(flat), _AT_ONCE):
+        part = slice(first, first + _AT_ONCE)
+        relative = np.clip(flat[part] / np.float32(sensor.white), 0.0, 1.0)
+        match sensor:
+            case Srgb8():
+                values[part] = _srgb8(np.asarray(relative, np.float32))
+            case Linear():
+                values[part] = np.floor(relative * sensor.full_scale + 0.5)
+            case unknown:
+                assert_never(unknown)
+    return values.reshape(radiance.shape)
 
 
 def _srgb8(relative: NDArray[np.float32]) -> NDArray[np.uint8]:
-    """Values of relative radiances 0 to 1: looked up, and worked out where a bin of the table holds two of them."""
-    table, alone = _srgb8_table()
-    bins = (relative * np.float32(_BINS)).astype(np.int32)
-    values = np.take(table, bins)
-    rest = np.flatnonzero(~np.take(alone, bins))
-    values.reshape(-1)[rest] = _rounded(relative.reshape(-1)[rest])
+    """Values `[N]` of relative radiances 0 to 1: looked up, and worked out where a bin may hold two of them."""
+    found = np.take(_srgb8_table(), (relative * np.float32(_BINS)).astype(np.intp))
+    values = found.astype(np.uint8)
+    rest = np.flatnonzero(found == _UNKNOWN)
+    values[rest] = _rounded(relative[rest])
     return values
 
 
 @functools.cache
-def _srgb8_table() -> tuple[NDArray[np.uint8], NDArray[np.bool_]]:
-    """The value in each of `_BINS` bins and of white, and whether the bin and its neighbours hold no other."""
+def _srgb8_table() -> NDArray[np.uint16]:
+    """The value in each of `_BINS` bins and of white, `_UNKNOWN` where the bin or a neighbour holds another."""
     low = _rounded(np.arange(_BINS + 1, dtype=np.float32) / np.float32(_BINS))
     padded = np.pad(low, (1, 2), mode="edge")
-    return low, (padded[:-3] == low) & (padded[3:] == low)
+    return np.where((padded[:-3] == low) & (padded[3:] == low), low, np.uint16(_UNKNOWN))
 
 
 def _rounded(relative: NDArray[np.float32]) -> NDArray[np.uint8]:
@@ -71,7 +78,7 @@ class Exposure:
         self.sensor = sensor
         match sensor:
             case Srgb8() | Linear():
-                self._encoded = np.concatenate([encode(band, sensor) for band in np.array_split(background, 16)])
+                self._encoded = encode(background, sensor)
                 self._canvas: Pixels | None = None  #: a copy of it, to paint on
             case Emva():
                 pass
@@ -153,8 +160,8 @@ class Exposure:
                 assert_never(unknown)
 
     def _lit(self, tiles: Sequence[Tile], power_w: float) -> tuple[Crop, NDArray[np.float32]]:
-        crop, total = merged(tiles)
-        return crop, self._background[crop.slices] + np.float32(power_w) * total
+        tile = merged(tiles)
+        return tile.crop, self._background[tile.crop.slices] + np.float32(power_w) * tile.radiance
 
     def _noisy(self, camera: Emva, lit: Sequence[Tile], power_w: float, seed: int) -> Pixels:
         signal = self._background
@@ -168,7 +175,7 @@ class Exposure:
         if camera.metering is None or not lit:
             return camera
         _, signal = self._lit(lit, power_w)
-        reached = merged(lit)[1].max(axis=-1) > 0.0
+        reached = merged(lit).radiance.max(axis=-1) > 0.0
         return camera.model_copy(update={"exposure_time": emva.metered_time(signal[reached], camera)})
 
     def _for_frame(self, camera: Emva, lit: Sequence[Tile], power_w: float) -> Emva:
@@ -182,8 +189,10 @@ class Exposure:
         return emva.demosaic(raw) if signal.shape[-1] == 3 else raw
 
 
-def merged(tiles: Sequence[Tile]) -> tuple[Crop, NDArray[np.float32]]:
-    """The tiles' sum `[h, w, C]` over the crop that holds them all."""
+def merged(tiles: Sequence[Tile]) -> Tile:
+    """The tiles' sum, over the crop that holds them all."""
+    if len(tiles) == 1:
+        return tiles[0]
     row = min(t.crop.row for t in tiles)
     column = min(t.crop.column for t in tiles)
     height = max(t.crop.row + t.crop.height for t in tiles) - row
@@ -193,4 +202,4 @@ def merged(tiles: Sequence[Tile]) -> tuple[Crop, NDArray[np.float32]]:
         rows = slice(tile.crop.row - row, tile.crop.row - row + tile.crop.height)
         columns = slice(tile.crop.column - column, tile.crop.column - column + tile.crop.width)
         total[rows, columns] += tile.radiance
-    return Crop(row, column, height, width), total
+    return Tile(Crop(row, column, height, width), total)

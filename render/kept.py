@@ -1,6 +1,7 @@
 """Backgrounds kept on disk, by what they show: for every rig, worker and run with the same eye, camera and light.
 
-They lie in $XDG_CACHE_HOME/conespot, ~/.cache/conespot where that is not set; CONESPOT_CACHE=off makes no use of them.
+The files lie in $XDG_CACHE_HOME/conespot, ~/.cache/conespot where that is not set; CONESPOT_CACHE=off makes no use of
+them. What somebody in this process still holds is given again with or without them.
 """
 
 from __future__ import annotations
@@ -16,6 +17,7 @@ import time
 from collections.abc import Callable, Iterator
 from functools import cache
 from pathlib import Path
+from weakref import WeakValueDictionary
 
 import numpy as np
 from numpy.typing import NDArray
@@ -30,6 +32,8 @@ LIMIT = 2 * 1024**3
 _DIGEST = 64
 #: seconds after which an unfinished file is one that nobody writes any more
 _ABANDONED = 3600.0
+#: what was given before, as long as anybody holds it
+_HELD: WeakValueDictionary[str, Image] = WeakValueDictionary()
 _PACKAGES = ("mitsuba", "drjit", "numpy", "opencv-python-headless", "karellen-llvm-core")
 
 
@@ -51,6 +55,13 @@ def kept(address: str, shape: tuple[int, int, int], render: Callable[[], Image])
 
     An image from disk is mapped, so that processes share its memory; one that is torn or altered is rendered anew.
     """
+    image = _HELD.get(address)
+    if image is None:
+        image = _HELD[address] = _fetched(address, shape, render)
+    return image
+
+
+def _fetched(address: str, shape: tuple[int, int, int], render: Callable[[], Image]) -> Image:
     place = folder()
     if place is None:
         return render()

@@ -73,27 +73,34 @@ class Renderer:
         if self._shaft is not None:
             self._lit.update(shaft.placed(self._mi, self._shaft, pose))
         self.rendered += 1
-        radiance = self._radiance(crop, seed)
-        # the few samples of a pixel that the edge barely enters may all miss it, and then show no noise either
-        if radiance.size and (self.edge_samples > self.samples or self._few_first):
-            pixels = crop.pixels(shape[1])
-            edge = np.isin(pixels, rim_pixels(self.scene, pose, spotlight))
-            samples = max(self.edge_samples, self.samples)
-            radiance[edge.reshape(crop.height, crop.width)] = self._lit.pixels(pixels[edge], samples, seed)
-        return Tile(crop, radiance)
+        return Tile(crop, self._radiance(crop, self._edge(crop, pose, spotlight), seed))
 
     @property
     def _few_first(self) -> bool:
         """Whether a pilot of few samples says where all of them are needed."""
         return self.samples > monte_carlo.PILOT and self.noise > 0.0 and self._lit.tells_noise
 
-    def _radiance(self, crop: Crop, seed: int) -> Image:
-        """The crop `[h, w, C]` by few samples, and by all of them where few leave too much noise."""
-        if not self._few_first or crop.height == 0 or crop.width == 0:
-            return self._lit.render(crop, self.samples, seed)
-        radiance, doubt = monte_carlo.mean_and_doubt(self._lit.halves(crop, monte_carlo.PILOT, ~seed), self.noise)
-        pixels = crop.pixels(self.scene.camera.shape[1])[doubt.ravel()]
-        radiance[doubt] = self._lit.pixels(pixels, self.samples, seed)
+    def _edge(self, crop: Crop, pose: Pose, spotlight: int) -> NDArray[np.bool_]:
+        """Which pixels `[h, w]` need other samples than a pilot's or the rest's: a patch's hard edge."""
+        pixels = crop.pixels(self.scene.camera.shape[1])
+        # the few samples of a pixel that the edge barely enters may all miss it, and then show no noise either
+        if pixels.size and (self.edge_samples > self.samples or self._few_first):
+            edge = np.isin(pixels, rim_pixels(self.scene, pose, spotlight))
+        else:
+            edge = np.zeros(pixels.shape, bool)
+        return edge.reshape(crop.height, crop.width)
+
+    def _radiance(self, crop: Crop, edge: NDArray[np.bool_], seed: int) -> Image:
+        """The crop `[h, w, C]` by few samples, and by all of them where few leave too much noise and on the edge."""
+        doubt = np.zeros_like(edge)
+        if self._few_first and edge.size:
+            radiance, doubt = monte_carlo.mean_and_doubt(self._lit.halves(crop, monte_carlo.PILOT, ~seed), self.noise)
+        else:
+            radiance = self._lit.render(crop, self.samples, seed)
+        pixels = crop.pixels(self.scene.camera.shape[1]).reshape(edge.shape)
+        for where, samples in ((doubt & ~edge, self.samples), (edge, max(self.edge_samples, self.samples))):
+            if where.any():
+                radiance[where] = self._lit.pixels(pixels[where], samples, seed)
         return radiance
 
     def footprint(self, pose: Pose, spotlight: int) -> Crop:

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import multiprocessing
+import os
+import warnings
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
@@ -12,7 +15,7 @@ from conespot.results.figure_kind import Cut, FigureKind
 from conespot.results.pose_figure import AlongTrajectory
 from conespot.results.power_figure import OverPower
 from conespot.results.run import Run
-from conespot.results.style import save, style
+from conespot.results.style import files, save, style
 from conespot.results.variants import ordered, paired
 
 FIGURES: dict[str, FigureKind] = {kind.name: kind for kind in (AlongTrajectory(), OverPower())}
@@ -47,13 +50,29 @@ def plan_figures(run: Run, boxes: pd.DataFrame | None) -> tuple[list[Drawing], i
 
 
 def draw_figures(drawings: list[Drawing], folder: Path) -> list[Path]:
-    """Draw them as PNG and SVG into the folder. Raises InputError."""
-    written: list[Path] = []
+    """Draw them as PNG and SVG into the folder, on all cores where the system can fork. Raises InputError."""
+    cores = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else 1
+    shares = [drawings[i::cores] for i in range(cores) if drawings[i::cores]]
+    helpers = []
+    for share in shares[1:]:
+        helpers.append(multiprocessing.get_context("fork").Process(target=_draw, args=(share, folder), daemon=True))
+        with warnings.catch_warnings():
+            # of threads that might hold what drawing needs: those of Arrow and BLAS do not
+            warnings.simplefilter("ignore", DeprecationWarning)
+            helpers[-1].start()
+    for share in shares[:1]:
+        _draw(share, folder)
+    for helper, share in zip(helpers, shares[1:], strict=True):
+        helper.join()
+        if helper.exitcode:
+            _draw(share, folder)  # says what is wrong, or has memory enough now
+    return [path for drawing in drawings for path in files(folder / drawing.name)]
+
+
+def _draw(drawings: list[Drawing], folder: Path) -> None:
     for drawing in drawings:
         with style():
-            figure = drawing.kind.draw(drawing.cut, drawing.title, drawing.caption)
-            written += save(figure, folder / drawing.name)
-    return written
+            save(drawing.kind.draw(drawing.cut, drawing.title, drawing.caption), folder / drawing.name)
 
 
 def _cuts(run: Run, boxes: pd.DataFrame) -> Iterator[Cut]:

@@ -71,9 +71,14 @@ def style() -> Iterator[None]:
         yield
 
 
+def files(stem: Path) -> list[Path]:
+    """What `save` writes."""
+    return [stem.with_name(f"{stem.name}.{kind}") for kind in ("png", "svg")]
+
+
 def save(figure: Figure, stem: Path) -> list[Path]:
     """Write `stem`.png and `stem`.svg, without dates or versions. Call it inside `style`. Raises InputError."""
-    png, svg = stem.with_name(stem.name + ".png"), stem.with_name(stem.name + ".svg")
+    png, svg = files(stem)
     image, drawing = io.BytesIO(), io.BytesIO()
     figure.set_dpi(_DPI)
     canvas = FigureCanvasAgg(figure)

@@ -29,9 +29,9 @@ class Mask:
     side: int  #: rows of the frame
 
     @classmethod
-    def above(cls, grey: Grey, level: int) -> Mask:
-        """Where grey values `[H, W]` exceed a level."""
-        rows = _span(grey.max(axis=1) > level)
+    def above(cls, grey: Grey, level: int, highest: Grey | None = None) -> Mask:
+        """Where grey values `[H, W]`, with `highest` `[H]` in their rows, exceed a level."""
+        rows = _span((grey.max(axis=1) if highest is None else highest) > level)
         columns = _span(grey[rows].max(axis=0) > level)
         bright = cv2.threshold(grey[rows, columns], level, 1, cv2.THRESH_BINARY)[1]
         return cls(np.asarray(bright, np.uint8), columns.start, rows.start, len(grey))
@@ -39,10 +39,12 @@ class Mask:
 
 def otsu_mask(grey: Grey) -> Mask:
     """Patches in grey values `[H, W]` by the paper's text: Gaussian, median, Otsu."""
-    smooth, counts = smoothed(grey)
-    if counts is None:
-        return Mask.above(smooth, round(cv2.threshold(smooth, 0, 1, cv2.THRESH_OTSU)[0]))
-    return Mask.above(smooth, otsu_threshold(counts))
+    smooth = smoothed(grey)
+    if smooth.counts is None:
+        level = round(cv2.threshold(smooth.grey, 0, 1, cv2.THRESH_OTSU)[0])
+    else:
+        level = otsu_threshold(smooth.counts)
+    return Mask.above(smooth.grey, level, smooth.highest)
 
 
 def otsu_threshold(counts: Counts) -> int:

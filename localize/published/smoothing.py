@@ -7,6 +7,7 @@ camera differ only where the patches are: all else has been filtered and counted
 from __future__ import annotations
 
 import threading
+from dataclasses import dataclass
 
 import cv2
 import numpy as np
@@ -32,25 +33,35 @@ class _Last(threading.local):
     grey: Grey = np.zeros((0, 0), np.uint8)
     smooth: Grey | None = None
     counts: Counts = np.zeros(256, np.int64)
+    highest: Grey = np.zeros(0, np.uint8)
 
 
 _LAST = _Last()
 
 
-def smoothed(grey: Grey) -> tuple[Grey, Counts | None]:
-    """Grey values `[H, W]` after Gaussian and median, and how many pixels have each value `[256]` where that is known.
-
-    The same to the byte as filtering the whole frame. Both arrays are good until the next call in this thread.
+@dataclass(frozen=True, eq=False)
+class Smooth:
+    """Grey values `[H, W]` after both filters, the highest of each row `[H]`, and where that is known how many pixels
+    have each value `[256]`. All are good until the next frame of this thread.
     """
+
+    grey: Grey
+    highest: Grey
+    counts: Counts | None = None
+
+
+def smoothed(grey: Grey) -> Smooth:
+    """Grey values `[H, W]` after Gaussian and median: the same to the byte as filtering the whole frame."""
     last = _LAST
     new = _differing(grey, last.grey)
     if new == _whole(grey):
         last.grey, last.smooth = grey.copy(), None
-        return _filtered(grey), None
+        smooth = _filtered(grey)
+        return Smooth(smooth, smooth.max(axis=1))
     last.grey[new] = grey[new]
     if last.smooth is None:
         last.smooth = _filtered(grey)
-        last.counts = _counts(last.smooth)
+        last.counts, last.highest = _counts(last.smooth), last.smooth.max(axis=1)
     else:
         touched = _grown(new, grey)
         seen = _grown(touched, grey)
@@ -58,7 +69,8 @@ def smoothed(grey: Grey) -> tuple[Grey, Counts | None]:
         smooth = _filtered(grey[seen])[inside]
         last.counts = last.counts - _counts(last.smooth[touched]) + _counts(smooth)
         last.smooth[touched] = smooth
-    return last.smooth, last.counts
+        last.highest[touched[0]] = last.smooth[touched[0]].max(axis=1)
+    return Smooth(last.smooth, last.highest, last.counts)
 
 
 def _filtered(grey: Grey) -> Grey:
@@ -80,7 +92,8 @@ def _differing(a: Grey, b: Grey) -> Box:
     starts = range(0, len(a), _BAND)
 
     def differ(start: int) -> bool:
-        return not np.array_equal(a[start : start + _BAND], b[start : start + _BAND])
+        # numpy would write down where before it says whether
+        return cv2.norm(a[start : start + _BAND], b[start : start + _BAND], cv2.NORM_INF) > 0.0
 
     first = next(filter(differ, starts), None)
     if first is None:
