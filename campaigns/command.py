@@ -14,16 +14,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
     from pathlib import Path
 
-    from conespot.scene.document import Document
-
-#: options that set a key of the campaign
-_SETTINGS = {
-    "resolution": ("scene.camera.resolution", "PX", "pixels a side of a frame"),
-    "poses": ("poses", "N", "poses of each trajectory"),
-    "samples": ("samples", "N", "rendering samples a pixel"),
-    "seed": ("seed", "N", "seed of every random number"),
-    "localizers": ("localizers", "A,B", "localizers to use"),
-}
+    from conespot.campaigns.session import Session
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -71,6 +62,7 @@ def _parser() -> argparse.ArgumentParser:
     from pathlib import Path
 
     from conespot.campaigns.machines import add_machines
+    from conespot.campaigns.settings import add_set, add_settings
 
     parser = argparse.ArgumentParser(
         prog="campaign",
@@ -92,16 +84,9 @@ def _parser() -> argparse.ArgumentParser:
     for command in (run, plan, validate, theory):
         if command is not theory:
             command.add_argument("campaign", help="a YAML file, or the name of a shipped campaign")
-        command.add_argument(
-            "--set",
-            action="append",
-            default=[],
-            metavar="KEY=VALUE",
-            help="set a key, such as scene.eye.radius='12 mm'",
-        )
+        add_set(command)
     for command in (run, plan, validate):
-        for name, (_, metavar, text) in _SETTINGS.items():
-            command.add_argument(f"--{name}", metavar=metavar, help=text)
+        add_settings(command)
     run.add_argument("--dry-run", action="store_true", help="only say what the run would do")
     run.add_argument("--out", metavar="FOLDER", help="the run folder (default: runs/NAME)")
     run.add_argument("--shard", metavar="I/N", help="only this share of the poses, into a folder that `merge` reads")
@@ -111,6 +96,16 @@ def _parser() -> argparse.ArgumentParser:
     listed = add("list", _list, "list the shipped campaigns")
     listed.add_argument("--localizers", action="store_true", help="list the localizers in their place")
     add("show", _show, "print a campaign's file").add_argument("campaign")
+    run.add_argument("--log", metavar="FILE", type=Path, help="append what happens to a file, a JSON object a line")
+    status = add("status", _status, "say how far a run is, while it goes or after, and why poses failed")
+    status.add_argument("folder", type=Path, metavar="RUN")
+    retry = add("retry", _retry, "run poses of a run again, such as: campaign retry runs/power_sweep --failed")
+    retry.add_argument("folder", type=Path, metavar="RUN")
+    which = retry.add_mutually_exclusive_group(required=True)
+    which.add_argument("--failed", action="store_true", help="those that were lost to an error")
+    which.add_argument("--reason", metavar="TEXT", help="those with a frame that failed for a reason that holds TEXT")
+    add_machines(retry)
+    retry.add_argument("--log", metavar="FILE", type=Path, help="as for run")
     report = add("report", _report, "make the tables, figures and report of a run folder again")
     report.add_argument("folder", type=Path, metavar="RUN")
     merge = add("merge", _merge, "make one run folder of those of a campaign's shards")
@@ -129,26 +124,11 @@ def _parser() -> argparse.ArgumentParser:
     return parser
 
 
-def _document(options: argparse.Namespace) -> Document:
-    """The campaign's file with the settings of the command line on it."""
-    from conespot.campaigns.schema import override, read_campaign, setting
-
-    document = read_campaign(options.campaign)
-    for name, (key, _, _) in _SETTINGS.items():
-        value = getattr(options, name)
-        if value is not None:
-            text = f"[{value}]" if name == "localizers" else value
-            document = override(document, key, text, f"--{name}")
-    for text in options.set:
-        key, value = setting(text)
-        document = override(document, key, value, f"--set {key}")
-    return document
-
-
 def _validate(options: argparse.Namespace) -> Ending:
     from conespot.campaigns.plan import make_plan
+    from conespot.campaigns.settings import document_of
 
-    plan = make_plan(_document(options))
+    plan = make_plan(document_of(options))
     _say(f"{options.campaign}: valid, {len(plan.cases)} cases, {plan.rows} rows")
     return Ending.DONE
 
@@ -157,9 +137,10 @@ def _plan(options: argparse.Namespace) -> Ending:
     from conespot.campaigns.machines import jobs_in_words, profile_of
     from conespot.campaigns.plan import make_plan
     from conespot.campaigns.plan_words import describe
+    from conespot.campaigns.settings import document_of
 
     profile = profile_of(options)
-    _say("\n".join(describe(make_plan(_document(options)), profile.workers if profile else options.workers)))
+    _say("\n".join(describe(make_plan(document_of(options)), profile.workers if profile else options.workers)))
     if jobs := jobs_in_words(profile):
         _say(jobs)
     return Ending.DONE
@@ -168,11 +149,35 @@ def _plan(options: argparse.Namespace) -> Ending:
 def _run(options: argparse.Namespace) -> Ending:
     if options.dry_run:
         return _plan(options)
-    document = _document(options)
+    from conespot.campaigns.settings import document_of
+
+    document = document_of(options)
+    from conespot.campaigns.log import Log
     from conespot.campaigns.machines import executor_of, shard_of
     from conespot.campaigns.session import carry_out
 
-    session = carry_out(document, options.out, executor_of(options), shard_of(options))
+    log = Log(options.log) if options.log else None
+    return _end(carry_out(document, options.out, executor_of(options), shard_of(options), log=log))
+
+
+def _retry(options: argparse.Namespace) -> Ending:
+    from conespot.campaigns.log import Log
+    from conespot.campaigns.machines import executor_of
+    from conespot.campaigns.steering import retry
+
+    log = Log(options.log) if options.log else None
+    return _end(retry(options.folder, options.reason, executor_of(options), log))
+
+
+def _status(options: argparse.Namespace) -> Ending:
+    from conespot.campaigns.steering import status
+
+    _say(status(options.folder))
+    return Ending.DONE
+
+
+def _end(session: Session) -> Ending:
+    """Say how a session ended."""
     if session.interrupted:
         return _complain(session.interrupted, Ending.INTERRUPTED)
     _say_results(session.folder)
@@ -189,11 +194,9 @@ def _theory(options: argparse.Namespace) -> Ending:
 
 
 def _report(options: argparse.Namespace) -> Ending:
-    from conespot.campaigns.session import renew_rows
-    from conespot.results import write_results
+    from conespot.campaigns.session import report
 
-    renew_rows(options.folder)
-    write_results(options.folder)
+    report(options.folder)
     _say_results(options.folder)
     return Ending.DONE
 

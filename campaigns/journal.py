@@ -8,6 +8,7 @@ those of earlier versions, and believed if they are units of the plan.
 
 from __future__ import annotations
 
+import contextlib
 import os
 import re
 import sys
@@ -18,6 +19,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import IO
 
+from pydantic import ValidationError
+
 from conespot.campaigns.plan import Plan
 from conespot.campaigns.row import Record
 
@@ -27,16 +30,19 @@ _HEAD = re.compile(rb'\{"crc":"([0-9a-f]{8})",')
 _UNCHECKED = b'{"unit":"'
 #: a finding with its longest reason and a covariance is shorter
 _LONGEST_FINDING = 8192
+#: no line is longer, whatever its campaign
+_LONGEST = 200_000_000
 
 
 @dataclass(frozen=True, slots=True)
 class Entry:
-    """A finished unit: where its line stands, what lost it, who made it, and why which of its findings failed."""
+    """A finished unit: where its line stands, what lost it, who made it, its answers and why some are failures."""
 
     offset: int
     length: int
     error: str
     by: str
+    answers: int
     reasons: tuple[str, ...]
 
 
@@ -55,7 +61,8 @@ class Journal:
             group.key: (len(group.positions), Counter((c.key, name) for c in group.cases for name in c.localizers))
             for group in plan.groups
         }
-        self._longest = _LONGEST_FINDING * (1 + max((group.rows for group in plan.groups), default=0))
+        longest = max((group.rows for group in plan.groups), default=0) + 1
+        self._longest = min(longest * _LONGEST_FINDING, _LONGEST)
         self._whole = True  #: the file ends with a line's end
         self._read()
 
@@ -71,25 +78,31 @@ class Journal:
         finally:
             self._whole = written == len(data) or (self._whole and not written)
         os.fsync(file)
-        self._keep(record, os.fstat(file).st_size - len(line), len(line))
+        self._keep(record, self.size - len(line), len(line))
 
     def record(self, unit: str) -> Record:
         """The record of a finished unit, read again. Raises KeyError for one that is not finished."""
         entry = self.entries[unit]
         self._stream.seek(entry.offset)
-        return Record.model_validate_json(_body(self._stream.read(entry.length)))
+        return Record.model_validate_json(_json(self._stream.read(entry.length)))
 
     def records(self) -> Iterator[Record]:
         """The records of all finished units, one after the other."""
         return (self.record(unit) for unit in self.entries)
 
+    @property
+    def size(self) -> int:
+        """Bytes of the file."""
+        return os.fstat(self._stream.fileno()).st_size
+
     def _read(self) -> None:
         """Read what the file holds now."""
-        for number, offset, line in self._lines():
+        for number, offset, line, ended in _lines(self._stream, self._longest):
+            self._whole = ended
             wrong = self._take(line, offset)
             if wrong is None:
                 continue
-            if not self._whole:
+            if not ended:
                 if not self._stream.writable():
                     return  # another process may be writing it
                 wrong = "was torn before its end"
@@ -101,30 +114,14 @@ class Journal:
                 within = after
             self.damage.append(f"{self.path}:{number}: {wrong}; the line is passed over, and its pose runs again")
 
-    def _lines(self) -> Iterator[tuple[int, int, bytes]]:
-        """Number, place and bytes of the lines; of one that is too long its beginning."""
-        self._stream.seek(0)
-        number = offset = 0
-        while line := self._stream.readline(self._longest):
-            number, at, begins = number + 1, offset, line
-            offset += len(line)
-            while not line.endswith(b"\n") and (line := self._stream.readline(self._longest)):
-                offset += len(line)
-            self._whole = line.endswith(b"\n")
-            yield number, at, begins
-
     def _take(self, line: bytes, offset: int) -> str | None:
         """Keep the unit of a line, or say what is wrong with it."""
-        head = _HEAD.match(line)
-        body = line.removesuffix(b"\n")
-        if head is None and not line.startswith(_UNCHECKED):
-            return "is no line of a journal"
-        if head is not None and int(head[1], 16) != zlib.crc32(body[head.end() :]):
-            return "does not match its checksum"
         try:
-            record = Record.model_validate_json(_body(line))
-        except ValueError:
+            record = Record.model_validate_json(_json(line))
+        except ValidationError:
             return "holds no finished pose"
+        except ValueError as error:
+            return str(error)
         if not self._planned(record):
             return "is no pose of this campaign"
         self._keep(record, offset, len(line))
@@ -138,7 +135,9 @@ class Journal:
 
     def _keep(self, record: Record, offset: int, length: int) -> None:
         reasons = tuple(sys.intern(found.reason) for found in record.findings if found.reason)
-        self.entries[record.unit] = Entry(offset, length, record.error, sys.intern(record.by), reasons)
+        self.entries[record.unit] = Entry(
+            offset, length, sys.intern(record.error), sys.intern(record.by), len(record.findings), reasons
+        )
 
 
 def encode(record: Record) -> bytes:
@@ -147,7 +146,33 @@ def encode(record: Record) -> bytes:
     return b'%s%08x",%s\n' % (_MARK, zlib.crc32(body), body)
 
 
-def _body(line: bytes) -> bytes:
-    """The JSON of a record in a line, without the checksum."""
+def whole_lines(stream: IO[bytes]) -> Iterator[bytes]:
+    """The JSON of a journal's lines whose checksum holds, whatever campaign they are of."""
+    for _, _, line, _ in _lines(stream, _LONGEST):
+        with contextlib.suppress(ValueError):
+            yield _json(line)
+
+
+def _lines(stream: IO[bytes], longest: int) -> Iterator[tuple[int, int, bytes, bool]]:
+    """Number, place and bytes of the lines, of one that is too long its beginning, and whether they end as lines do."""
+    stream.seek(0)
+    number = offset = 0
+    while line := stream.readline(longest):
+        number, at, begins = number + 1, offset, line
+        offset += len(line)
+        while not line.endswith(b"\n") and (line := stream.readline(longest)):
+            offset += len(line)
+        yield number, at, begins, line.endswith(b"\n")
+
+
+def _json(line: bytes) -> bytes:
+    """The JSON of a record in a line. Raises ValueError if the line is none or is not what was written."""
     head = _HEAD.match(line)
-    return line if head is None else b"{" + line[head.end() :]
+    if head is None:
+        if line.startswith(_UNCHECKED):
+            return line
+        raise ValueError("is no line of a journal")
+    body = line.removesuffix(b"\n")[head.end() :]
+    if int(head[1], 16) != zlib.crc32(body):
+        raise ValueError("does not match its checksum")
+    return b"{" + body

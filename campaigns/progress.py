@@ -46,10 +46,10 @@ class Progress:
         """Where the run stands."""
         share = self._done / self._frames if self._frames else 1.0
         failed = f", {self._failed} not localized" if self._failed else ""
-        text = f"{self._done} of {self._frames} frames ({share:.0%}){failed}, {_time(self._clock() - self._start)}"
+        text = f"{self._done} of {self._frames} frames ({share:.0%}){failed}, {clock_time(self._clock() - self._start)}"
         remaining = self.remaining()
         known = remaining is not None and self._done < self._frames
-        return f"{text}, {_time(remaining)} left" if known and remaining is not None else text
+        return f"{text}, {clock_time(remaining)} left" if known and remaining is not None else text
 
     def remaining(self) -> float | None:
         """Time left [s]; None until a few units have shown the pace."""
@@ -58,6 +58,12 @@ class Progress:
         # the first unit of the window only marks its beginning
         done = sum(work for _, work in self._pace) - self._pace[0][1]
         return max(self._work, 0.0) * (self._pace[-1][0] - self._pace[0][0]) / done
+
+    def pace(self) -> float | None:
+        """Units a second; None until a few have shown it."""
+        if self.remaining() is None:
+            return None
+        return (len(self._pace) - 1) / (self._pace[-1][0] - self._pace[0][0])
 
     def note(self, sentence: str) -> None:
         """Say something that must not be lost among the progress."""
@@ -82,7 +88,8 @@ class Progress:
         self._stream.flush()
 
 
-def _time(seconds: float) -> str:
+def clock_time(seconds: float) -> str:
+    """Seconds as people read them: minutes and seconds, with hours where there are any."""
     minutes, rest = divmod(round(seconds), 60)
     hours, minutes = divmod(minutes, 60)
     return f"{hours}:{minutes:02}:{rest:02}" if hours else f"{minutes}:{rest:02}"

@@ -4,23 +4,28 @@ from __future__ import annotations
 
 import contextlib
 import sys
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
 from conespot.campaigns.ending import RunError
 from conespot.campaigns.executor import Executor
 from conespot.campaigns.interruption import interruption
-from conespot.campaigns.maker import Makers, in_a_line, maker
-from conespot.campaigns.plan import Plan, Unit, make_plan
+from conespot.campaigns.journal import Entry
+from conespot.campaigns.lock import alone
+from conespot.campaigns.log import Log
+from conespot.campaigns.plan import Unit, make_plan
 from conespot.campaigns.pool import LocalPool
-from conespot.campaigns.progress import Progress
 from conespot.campaigns.schema import override, read_campaign
 from conespot.campaigns.shard import Shard
-from conespot.campaigns.store import Store, goes_on, open_store, read_begun_with
+from conespot.campaigns.store import Store, goes_on, look_into, open_store, read_begun_with
+from conespot.campaigns.watch import Watch
 from conespot.scene import InputError
 from conespot.scene.atomic import write_atomically
 from conespot.scene.document import Document
+
+#: whether a session does a unit, given its entry in the journal, None if it has none
+Choose = Callable[[Entry | None], bool]
 
 
 @dataclass(frozen=True)
@@ -68,11 +73,24 @@ def run_campaign(
     return session.folder
 
 
-def carry_out(document: Document, out: str | Path | None, executor: Executor, shard: Shard | None = None) -> Session:
+def what_is_left(entry: Entry | None) -> bool:
+    """Choose the units that are not finished, or were lost."""
+    return entry is None or bool(entry.error)
+
+
+def carry_out(
+    document: Document,
+    out: str | Path | None,
+    executor: Executor,
+    shard: Shard | None = None,
+    choose: Choose = what_is_left,
+    log: Log | None = None,
+) -> Session:
     """Do what is left of a campaign and write what its folder holds: rows, theory, tables, figures, report.
 
-    Of a `shard` its poses alone, by default into a folder that is named after it.
-    Raises as `run_campaign` does, but for poses that were lost and for interruptions while poses are measured.
+    Of a `shard` its poses alone, by default into a folder that is named after it. `choose` says which poses are left,
+    `log` is told of each. Raises as `run_campaign` does, but for poses that were lost and for interruptions while poses
+    are measured.
     """
     from conespot.results import write_results
 
@@ -81,14 +99,32 @@ def carry_out(document: Document, out: str | Path | None, executor: Executor, sh
     name = plan.campaign.name + (f"-{shard.number}-of-{shard.count}" if shard else "")
     folder = Path(out or Path("runs") / name)
     with open_store(folder, plan, document) as store:
-        if plan.cases and _measure(plan, store, executor, units):
+        if shard:
+            store.poses = len(units)
+        left = [unit for unit in units if choose(store.entries.get(unit.key))]
+        if plan.cases and _measure(store, executor, left, Watch(store, units, left, log)):
             done = f"{len(store.entries)} of {len(units)} poses are kept"
             return Session(folder, interrupted=f"interrupted; {done}, and the same command continues the run")
         if plan.campaign.theory:
             _write_theory(folder)
         lost = tuple(entry.error for entry in store.entries.values() if entry.error)
-    write_results(folder)
+    with alone(folder):
+        write_results(folder)
     return Session(folder, lost)
+
+
+def report(folder: Path) -> None:
+    """Make rows, tables, figures and report of a run folder again, of what is finished if the run still goes.
+
+    Raises InputError for a folder that is no run or holds no rows.
+    """
+    from conespot.results import write_results
+
+    if not folder.is_dir():
+        raise InputError(f"{folder}: no such run folder; `campaign run NAME --out {folder}` makes one")
+    with alone(folder):
+        renew_rows(folder)
+        write_results(folder)
 
 
 def renew_rows(folder: Path) -> None:
@@ -110,49 +146,35 @@ def renew_rows(folder: Path) -> None:
             raise
         return
     if plan.campaign.made_with.get("identity") == plan.identity:
-        with open_store(folder, plan, document) as store:
+        with look_into(folder, plan) as store:
             sys.stderr.write("".join(f"{sentence}\n" for sentence in store.damage))
             store.write_rows()
 
 
-def _measure(plan: Plan, store: Store, executor: Executor, units: Sequence[Unit]) -> bool:
-    """Do what is left of the units, then write the rows of all that is finished; True when it was interrupted.
-
-    Units that were lost before are tried again.
-    """
-    left = [u for u in units if u.key not in store.entries or store.entries[u.key].error]
-    groups = {unit.key: plan.groups[unit.group] for unit in left}
-    progress = Progress(
-        sum(group.frames for group in groups.values()), sum(group.work for group in groups.values()), sys.stderr
-    )
-    begun = in_a_line(store.begun_with)
-    makers = Makers(entry.by or begun for entry in store.entries.values())
-    _say_where_it_stands(store, units, len(left), progress, makers)
+def _measure(store: Store, executor: Executor, left: Sequence[Unit], watch: Watch) -> bool:
+    """Measure the units that are left, then write the rows of all that is finished; True when it was interrupted."""
     frames = None
-    if plan.campaign.frames:
+    if store.plan.campaign.frames:
         frames = store.folder / "frames"
         frames.mkdir(exist_ok=True)
     raised = False
     with interruption:
-        records = executor.execute(plan, left, frames=frames, note=progress.note)
+        records = executor.execute(store.plan, left, frames=frames, note=watch.note)
         try:
             for record in records:
-                kept = store.append(record)
-                if another := makers.meet(kept.by):
-                    progress.note(another)
-                group = groups[record.unit]
-                progress.update(group.frames, group.work, sum(bool(f.reason) for f in record.findings))
+                watch.finished(store.append(record))
         except KeyboardInterrupt:  # in a program that calls `run_campaign`; the command has the flag in its place
             raised = True
         except BaseException:
             # what ended the run is what to say, not that its rows cannot be written either
-            with contextlib.suppress(InputError):
+            with contextlib.suppress(InputError), alone(store.folder):
                 store.write_rows()
             raise
         finally:
             records.close()
-        store.write_rows()
-        progress.close()
+        with alone(store.folder):
+            store.write_rows()
+        watch.close()
         return raised or interruption.asked
 
 
@@ -163,17 +185,3 @@ def _write_theory(folder: Path) -> None:
     lines = ["half_angle_deg,in_plane_um,distance_3d_um,volume_distance_3d_um"]
     lines += [f"{r.half_angle_deg!r},{r.in_plane_um!r},{r.distance_um!r},{r.volume_distance_um!r}" for r in table_1()]
     write_atomically(folder / "theory.csv", "".join(f"{line}\n" for line in lines).encode())
-
-
-def _say_where_it_stands(store: Store, units: Sequence[Unit], left: int, progress: Progress, makers: Makers) -> None:
-    for sentence in store.damage:
-        progress.note(sentence)
-    poses = len(units)
-    if left < poses:
-        progress.note(f"{store.folder}: {poses - left} of {poses} poses are finished, continuing")
-    else:
-        groups = [store.plan.groups[unit.group] for unit in units]
-        frames, rows = sum(group.frames for group in groups), sum(group.rows for group in groups)
-        progress.note(f"{store.folder}: {poses} poses, {frames} frames, {rows} localizations")
-    if left and (another := makers.expect(maker())):
-        progress.note(another)

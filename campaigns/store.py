@@ -11,15 +11,17 @@ import contextlib
 import io
 from collections.abc import Iterator, Mapping
 from pathlib import Path
-from typing import IO
 
 from conespot.campaigns.cases import write_cases
 from conespot.campaigns.ending import RunError
 from conespot.campaigns.journal import FILE, Entry, Journal
+from conespot.campaigns.lock import take
 from conespot.campaigns.maker import made_with, maker
 from conespot.campaigns.plan import Plan
 from conespot.campaigns.row import Record, rows
 from conespot.campaigns.schema import resolved
+from conespot.campaigns.standing import FILE as STANDING
+from conespot.campaigns.standing import Count, Standing
 from conespot.scene import InputError
 from conespot.scene.atomic import write_atomically
 from conespot.scene.document import Document, dump, read_document
@@ -42,6 +44,9 @@ class Store:
         self.begun_with = begun_with
         self.entries: Mapping[str, Entry] = journal.entries
         self._journal = journal
+        #: how many are to be finished, if not only a share of them is
+        self.poses = sum(len(group.positions) for group in plan.groups)
+        self._count = Count(journal.entries.values())
 
     @property
     def damage(self) -> list[str]:
@@ -56,16 +61,31 @@ class Store:
         What is kept also says who made it: this process, if the record does not say so.
         """
         record = record if record.by else record.model_copy(update={"by": maker()})
+        before = self.entries.get(record.unit)
         try:
             self._journal.append(record)
         except OSError as error:
             reason = f"{self.folder}: cannot be written: {error.strerror}"
             raise RunError(f"{reason}; what is finished is kept, and the same command continues the run") from None
+        self._count.replace(before, self.entries[record.unit])
         return record
 
     def record(self, unit: str) -> Record:
         """The record of a finished unit. Raises KeyError for one that is not finished."""
         return self._journal.record(unit)
+
+    def standing(self, pace: float | None = None, left_s: float | None = None) -> Standing:
+        """Where the run stands, at a `pace` of poses a second with `left_s` [s] to go."""
+        return self._count.standing(self.poses, self._journal.size, pace, left_s)
+
+    def keep_standing(self, pace: float | None = None, left_s: float | None = None) -> None:
+        """Write where the run stands, for `campaign status`.
+
+        Nothing rests on it, so that a disk that refuses it is heard of by the journal.
+        """
+        standing = self.standing(pace, left_s)
+        with contextlib.suppress(InputError):
+            write_atomically(self.folder / STANDING, standing.model_dump_json().encode())
 
     def write_rows(self) -> int:
         """Write errors.csv and errors.parquet of what is finished, in the plan's order; their number of rows."""
@@ -101,7 +121,8 @@ def open_store(folder: Path, plan: Plan, document: Document) -> Iterator[Store]:
     except OSError as error:
         raise InputError(f"{folder}: cannot be written: {error.strerror}; choose another --out") from None
     with journal:
-        _lock(journal, folder)
+        if not take(journal):
+            raise InputError(f"{folder}: another `campaign run` is writing to it; wait or choose another --out")
         known = folder / "campaign.yaml"
         if not known.exists():
             write_atomically(known, dump(resolved(document, made_with(plan))).encode())
@@ -115,7 +136,23 @@ def open_store(folder: Path, plan: Plan, document: Document) -> Iterator[Store]:
             raise InputError(f"{folder}: holds the run of another campaign or other settings; choose another --out")
         if plan.cases:
             write_cases(folder, plan)
-        yield Store(folder, plan, Journal(folder / FILE, plan, journal), begun_with)
+        store = Store(folder, plan, Journal(folder / FILE, plan, journal), begun_with)
+        store.keep_standing()
+        try:
+            yield store
+        finally:
+            store.keep_standing()
+
+
+@contextlib.contextmanager
+def look_into(folder: Path, plan: Plan) -> Iterator[Store]:
+    """The store of a run as it is now, which another process may work on meanwhile; nothing can be appended."""
+    try:
+        stream = open(folder / FILE, "rb")  # noqa: SIM115 - as above
+    except OSError as error:
+        raise InputError(f"{folder / FILE}: cannot be read: {error.strerror}") from None
+    with stream:
+        yield Store(folder, plan, Journal(folder / FILE, plan, stream), read_begun_with(folder))
 
 
 def _refuse_strangers(folder: Path) -> None:
@@ -138,17 +175,3 @@ def read_begun_with(folder: Path) -> dict[str, str]:
 def goes_on(begun_with: dict[str, str]) -> bool:
     """Whether what began a run names its cases as we do; what states no identity is no run of another version."""
     return "identity" not in begun_with or begun_with.get("schema") == str(SCHEMA)
-
-
-def _lock(journal: IO[bytes], folder: Path) -> None:
-    """Refuse a second writer, as long as the file is open; not where the system has no such locks."""
-    try:
-        import fcntl
-    except ImportError:
-        return
-    try:
-        fcntl.flock(journal, fcntl.LOCK_EX | fcntl.LOCK_NB)
-    except BlockingIOError:
-        raise InputError(f"{folder}: another `campaign run` is writing to it; wait or choose another --out") from None
-    except OSError:
-        return  # a network file system without locks
