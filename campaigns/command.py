@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import contextlib
 import os
 import sys
 
+from conespot.campaigns import streams
 from conespot.campaigns.ending import Ending, RunError
 from conespot.campaigns.interruption import interruption
 
@@ -24,21 +26,20 @@ def main(arguments: Sequence[str] | None = None) -> int:
     """
     if arguments is None:
         interruption.listen()
+        streams.make_safe()
     options = _parser().parse_args(arguments)
     from conespot.scene.document import InputError
 
     try:
         code: Ending = options.run(options)
-        sys.stdout.flush()
         return code
     except InputError as error:
         return _complain(error, Ending.BAD_INPUT)
     except KeyboardInterrupt:
         return _complain("interrupted", Ending.INTERRUPTED)
-    except BrokenPipeError:
-        # the reader of our output went away, `campaign plan | head`
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
-        return Ending.FAILED
+    except streams.UnheardError as error:
+        # silently where the reader went away, as in `campaign plan | head`
+        return _complain(error, Ending.FAILED) if str(error) else Ending.FAILED
     except RunError as error:
         return _complain(error, Ending.FAILED)
     except Exception as error:
@@ -49,12 +50,19 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 
 def _complain(error: object, code: Ending) -> Ending:
-    sys.stderr.write(f"campaign: {error}\n")
+    streams.complain(f"campaign: {error}")
     return code
 
 
 def _say(text: object) -> None:
-    sys.stdout.write(f"{text}\n")
+    """Say what the user asked to read."""
+    streams.say(text)
+
+
+def _mention(text: object) -> None:
+    """Say what stands in files too, so that nothing is lost if nobody hears it."""
+    with contextlib.suppress(streams.UnheardError):
+        streams.say(text)
 
 
 def _parser() -> argparse.ArgumentParser:
@@ -188,8 +196,8 @@ def _theory(options: argparse.Namespace) -> Ending:
     from conespot.campaigns.theory_run import write_theory_of
 
     folder, text = write_theory_of(options.scene, options.set, options.out)
-    _say(text)
-    _say(f"{folder}: table_1.csv, bounds.csv, budget.csv, design.csv, theory.txt, budget and design as PNG and SVG")
+    _mention(text)
+    _mention(f"{folder}: table_1.csv, bounds.csv, budget.csv, design.csv, theory.txt, budget and design as PNG and SVG")
     return Ending.DONE
 
 
@@ -216,8 +224,8 @@ def _merge(options: argparse.Namespace) -> Ending:
 def _compare(options: argparse.Namespace) -> Ending:
     from conespot.campaigns.compare import compare
 
-    _say(compare(options.folders, options.lights))
-    _say(f"{options.folders[0]}: comparison.txt, tables/comparison.csv, figures/comparison_*")
+    _mention(compare(options.folders, options.lights))
+    _mention(f"{options.folders[0]}: comparison.txt, tables/comparison.csv, figures/comparison_*")
     return Ending.DONE
 
 
@@ -232,8 +240,8 @@ def _check(options: argparse.Namespace) -> Ending:
 def _say_results(folder: Path) -> None:
     from conespot.results import tables_text
 
-    _say(tables_text(folder))
-    _say(f"{folder}: errors.csv, errors.parquet, boxes.csv, tables/, figures/; read report.html first")
+    _mention(tables_text(folder))
+    _mention(f"{folder}: errors.csv, errors.parquet, boxes.csv, tables/, figures/; read report.html first")
 
 
 def _list(options: argparse.Namespace) -> Ending:
@@ -254,8 +262,8 @@ def _show(options: argparse.Namespace) -> Ending:
     from conespot.scene.document import find_document, read_document
 
     path = find_document(options.campaign, "campaigns", "", "campaign")
-    read_document(path)
-    sys.stdout.write(path.read_text("utf-8"))
+    read_document(path)  # no control characters reach a terminal
+    streams.write(path.read_text("utf-8-sig"))
     return Ending.DONE
 
 
@@ -270,7 +278,6 @@ def _doctor(options: argparse.Namespace) -> Ending:
     try:
         for line in examine():
             _say(line)
-            sys.stdout.flush()
     except KernelError as error:
         raise RunError(str(error)) from None
     return Ending.DONE

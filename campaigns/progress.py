@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import shutil
 import time
 from collections import deque
@@ -78,14 +79,17 @@ class Progress:
         self._plain(self.line())
 
     def _plain(self, text: str) -> None:
-        self._stream.write(f"{text}\n")
-        self._stream.flush()
+        self._write(f"{text}\n")
 
     def _rewrite(self, text: str) -> None:
         text = text[: shutil.get_terminal_size().columns - 1]
-        self._stream.write(f"\r{text.ljust(self._width)}" if text else f"\r{' ' * self._width}\r")
+        self._write(f"\r{text.ljust(self._width)}" if text else f"\r{' ' * self._width}\r")
         self._width = len(text)
-        self._stream.flush()
+
+    def _write(self, text: str) -> None:
+        with contextlib.suppress(OSError):  # nobody listens any more: the run matters, not what is said of it
+            self._stream.write(text)
+            self._stream.flush()
 
 
 def clock_time(seconds: float) -> str:

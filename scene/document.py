@@ -6,27 +6,42 @@ Files may come from strangers: only plain data is read (no tags, no anchors), an
 from __future__ import annotations
 
 import difflib
+import os
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from importlib import resources
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any, NoReturn, TypeVar
 
 from pydantic import BaseModel, TypeAdapter, ValidationError
 from ruamel.yaml import YAML
+from ruamel.yaml.composer import Composer
 from ruamel.yaml.error import MarkedYAMLError, YAMLError
 from ruamel.yaml.nodes import MappingNode, Node, ScalarNode, SequenceNode
 
 from conespot.scene.quantity import FROM_FILE, in_unit_of
+from conespot.scene.text_file import at_home, read_text
 
 T = TypeVar("T")
 Path_ = tuple[str | int, ...]
-_MAX_BYTES = 1_000_000
+#: more than any description needs, and read in seconds: text, values and keys in it, and how deep they are nested
+_MAX_BYTES = 256_000
+_MAX_NODES = 12_000
+_MAX_DEPTH = 32
+_MAX_BITS = 1024
+_LONGEST = 1000
 _PLAIN_TAGS = {f"tag:yaml.org,2002:{name}" for name in ("str", "int", "float", "bool", "null")}
 
 
 class InputError(Exception):
-    """Something the user gave cannot be used; the message says what, where and how to mend it."""
+    """Something the user gave cannot be used; the message says what, where and how to mend it.
+
+    It is one line of printable characters, however long or strange the input that it names.
+    """
+
+    def __init__(self, sentence: str) -> None:
+        line = "".join(c if c.isprintable() else "?" for c in sentence)
+        super().__init__(line if len(line) <= _LONGEST else f"{line[: _LONGEST // 2]} ... {line[-_LONGEST // 2 :]}")
 
 
 @dataclass(frozen=True)
@@ -83,12 +98,15 @@ class Document:
                 # a bound reads best in the unit the value was written in
                 said = f"{said.removesuffix(str(bound).removesuffix('.0'))}{in_unit_of(written, bound)}"
             said += f", got {_short(written if isinstance(written, (str, int, float)) else first['input'])}"
-        return f"{self.place(keys)}: {name + ': ' if name else ''}{said}"
+        return f"{self.place(keys)}: {_cut(name) + ': ' if name else ''}{_cut(said, 400)}"
 
 
 def _short(value: object) -> str:
-    text = repr(value)
-    return text if len(text) <= 60 else text[:57] + "..."
+    return _cut(repr(value), 60)
+
+
+def _cut(text: str, longest: int = 200) -> str:
+    return text if len(text) <= longest else f"{text[: longest - 3]}..."
 
 
 def read_document(path: Path) -> Document:
@@ -97,15 +115,10 @@ def read_document(path: Path) -> Document:
     Raises InputError for a missing or unreadable file, bad syntax, tags, anchors, repeated keys and empty files.
     """
     try:
-        raw = path.read_bytes()
-    except OSError as error:
-        raise InputError(f"{path}: cannot be read: {error.strerror}") from None
-    if len(raw) > _MAX_BYTES:
-        raise InputError(f"{path}: larger than {_MAX_BYTES} bytes, which no description needs")
-    try:
-        data, lines = _load(raw.decode("utf-8"), str(path))
-    except UnicodeDecodeError as error:
-        raise InputError(f"{path}: not valid YAML: {error}") from None
+        text = read_text(path, _MAX_BYTES, "description")
+    except ValueError as error:
+        raise InputError(str(error)) from None
+    data, lines = _load(text, str(path))
     if data is None:
         raise InputError(f"{path}: is empty; `campaign show power_sweep` prints an example")
     if not isinstance(data, dict):
@@ -118,37 +131,63 @@ def read_value(text: str, source: str) -> Any:
     return _load(text, source)[0]
 
 
+class _Composer(Composer):
+    """Stops at what is no description, while it is read: anchors and aliases, too many values, too deep a nest."""
+
+    _nodes = 0
+
+    def compose_node(self, parent: Any, index: Any) -> Any:
+        event = self.parser.peek_event()
+        if getattr(event, "anchor", None):
+            self._refuse("anchors and aliases are not read; write the value out", event)
+        self._nodes += 1
+        if self._nodes > _MAX_NODES:
+            self._refuse(f"holds more than {_MAX_NODES} values, which no description needs", event)
+        if self.depth >= _MAX_DEPTH:
+            self._refuse(f"nested too deeply, {_MAX_DEPTH} levels are the most", event)
+        return super().compose_node(parent, index)
+
+    @staticmethod
+    def _refuse(reason: str, event: Any) -> NoReturn:
+        raise _NotPlainError(reason, event.start_mark.line + 1)
+
+
+class _NotPlainError(Exception):
+    """What is wrong, and the line it stands in."""
+
+
 def _load(text: str, source: str) -> tuple[Any, dict[Path_, str]]:
     yaml = YAML(typ="safe", pure=True)
+    yaml.Composer = _Composer
     lines: dict[Path_, str] = {}
     try:
         node = yaml.compose(text)
-        return (_plain(yaml, node, source, (), lines, set()) if node is not None else None), lines
+        return (_plain(yaml, node, source, (), lines) if node is not None else None), lines
+    except _NotPlainError as error:
+        raise InputError(f"{source}:{error.args[1]}: {error.args[0]}") from None
     except MarkedYAMLError as error:
         mark = error.problem_mark or error.context_mark
         line = f":{mark.line + 1}" if mark else ""
         raise InputError(f"{source}{line}: not valid YAML: {error.problem or error.context}") from None
     except YAMLError as error:
         raise InputError(f"{source}: not valid YAML: {' '.join(str(error).split())}") from None
-    except RecursionError:
-        raise InputError(f"{source}: nested too deeply") from None
 
 
-def _plain(yaml: YAML, node: Node, source: str, path: Path_, lines: dict[Path_, str], seen: set[int]) -> Any:
+def _plain(yaml: YAML, node: Node, source: str, path: Path_, lines: dict[Path_, str]) -> Any:
     where = f"{source}:{node.start_mark.line + 1}"
     lines.setdefault(path, where)
-    if id(node) in seen or node.anchor:
-        raise InputError(f"{where}: anchors and aliases are not read; write the value out")
-    seen.add(id(node))
     if isinstance(node, ScalarNode):
         if node.tag not in _PLAIN_TAGS:
             return _untagged(node, where)
         try:
-            return yaml.constructor.construct_object(node)
+            value = yaml.constructor.construct_object(node)
+            if isinstance(value, int) and value.bit_length() > _MAX_BITS:
+                raise ValueError("more than any quantity")
+            return value
         except ValueError:
             raise InputError(f"{where}: {_short(node.value)} is not a valid value") from None
     if isinstance(node, SequenceNode) and node.tag == "tag:yaml.org,2002:seq":
-        return [_plain(yaml, item, source, (*path, i), lines, seen) for i, item in enumerate(node.value)]
+        return [_plain(yaml, item, source, (*path, i), lines) for i, item in enumerate(node.value)]
     if isinstance(node, MappingNode) and node.tag == "tag:yaml.org,2002:map":
         result: dict[str, Any] = {}
         for key_node, value_node in node.value:
@@ -159,7 +198,7 @@ def _plain(yaml: YAML, node: Node, source: str, path: Path_, lines: dict[Path_, 
             if key in result:
                 raise InputError(f"{at}: '{key}' stands twice")
             lines[(*path, key)] = at
-            result[key] = _plain(yaml, value_node, source, (*path, key), lines, seen)
+            result[key] = _plain(yaml, value_node, source, (*path, key), lines)
         return result
     return _untagged(node, where)
 
@@ -192,16 +231,26 @@ def shipped(room: str, folder: str) -> dict[str, Path]:
 
 
 def find_document(name: str, room: str, folder: str, what: str) -> Path:
-    """The file `name` names: a path that exists, else a shipped one. Raises InputError if neither."""
-    path = Path(name)
-    if path.exists():
+    """The file `name` names: a path that exists and is no folder, else a shipped one. Raises InputError if neither."""
+    path = at_home(Path(name))
+    if is_file(path):
         return path
     known = shipped(room, folder)
     if path.parent == Path() and path.name.removesuffix(".yaml") in known:
         return known[path.name.removesuffix(".yaml")]
+    if os.path.isdir(path):
+        raise InputError(f"{name}: is a folder; name the {what}'s file in it")
     near = difflib.get_close_matches(path.name.removesuffix(".yaml"), list(known), n=1)
     hint = f"did you mean '{near[0]}'?" if near else f"shipped: {', '.join(known)}"
     raise InputError(f"{name}: no such {what}, neither a file nor shipped; {hint}")
+
+
+def is_file(path: Path) -> bool:
+    """Whether something can be read there: a file or a pipe, and no folder."""
+    try:
+        return path.exists() and not path.is_dir()
+    except (OSError, ValueError):  # a name too long, or with a NUL character
+        return False
 
 
 def dump(content: BaseModel | dict[str, Any]) -> str:

@@ -123,17 +123,18 @@ def _cubic(f: Array) -> tuple[Array, Array]:
 def _read_matrix(path: Path) -> list[list[float]]:
     """The numbers in a CSV file, row by row; `#` lines are left out. Raises ValueError with file and line."""
     matrix: list[list[float]] = []
-    for number, line in csv_lines(path, "height map"):
-        if len(matrix) == _MOST or line.count(",") >= _MOST:
-            raise ValueError(f"{path}:{number}: a height map has at most {_MOST} rows and columns")
+    for line in csv_lines(path, "height map"):
+        if len(matrix) == _MOST or len(line.cells) > _MOST:
+            raise ValueError(f"{path}:{line.number}: a height map has at most {_MOST} rows and columns")
         try:
-            row = [float(cell) for cell in line.split(",")]
-        except ValueError:
-            raise ValueError(f"{path}:{number}: expected heights separated by commas, as in `0, 12.5, 30`") from None
+            row = [line.value(column) for column in range(len(line.cells))]
+        except ValueError as error:
+            example = "expected heights separated by commas, as in `0, 12.5, 30`"
+            raise ValueError(f"{path}:{line.number}: {example} ({error})") from None
         if not np.all(np.isfinite(row)):
-            raise ValueError(f"{path}:{number}: heights must be finite numbers")
+            raise ValueError(f"{path}:{line.number}: heights must be finite numbers")
         if matrix and len(row) != len(matrix[0]):
-            raise ValueError(f"{path}:{number}: {len(row)} heights where the first row has {len(matrix[0])}")
+            raise ValueError(f"{path}:{line.number}: {len(row)} heights where the first row has {len(matrix[0])}")
         matrix.append(row)
     return matrix
 

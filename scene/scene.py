@@ -13,7 +13,7 @@ from pydantic import model_validator
 
 from conespot.scene.beam import Beam, CyclesBeam
 from conespot.scene.camera import Camera
-from conespot.scene.document import Document, find_document, merge, read_document
+from conespot.scene.document import Document, find_document, is_file, merge, read_document
 from conespot.scene.eye import Eye, Globe
 from conespot.scene.illumination import Ambient, FlatBand, Illumination
 from conespot.scene.model import Model
@@ -23,6 +23,7 @@ from conespot.scene.retina import PhotoRetina, Retina
 from conespot.scene.sensor import Sensor, Srgb8
 from conespot.scene.spotlights import RIGS, Instrument, Spotlights, spotlight_axes
 from conespot.scene.surface import AnySurface, Surface
+from conespot.scene.text_file import at_home
 
 
 class Scene(Model):
@@ -99,8 +100,8 @@ def expand(document: Document, at: tuple[str | int, ...]) -> Document:
     if not isinstance(data, dict) or "preset" not in data:
         return document
     name = str(data["preset"])
-    beside = document.folder / name
-    path = beside if beside.is_file() else find_document(name, "scene", "presets", "scene preset")
+    beside = at_home(document.folder / name)
+    path = beside if is_file(beside) else find_document(name, "scene", "presets", "scene preset")
     preset = _read_preset(path, path.stat().st_mtime_ns)
     full = merge(preset.data, {k: v for k, v in data.items() if k != "preset"})
     for key in reversed(at):

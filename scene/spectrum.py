@@ -11,9 +11,10 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from conespot.scene.csv_lines import csv_lines
+from conespot.scene.csv_lines import CsvLine, csv_lines, within
 
 Array = NDArray[np.float64]
+_MOST_PAIRS = 100_000
 
 
 @dataclass(frozen=True, eq=False)
@@ -122,19 +123,23 @@ def read_curve(path: Path) -> list[tuple[float, float]]:
     Raises ValueError with file and line for anything else.
     """
     pairs: list[tuple[float, float]] = []
-    header_seen = False
-    for number, line in csv_lines(path, "spectrum"):
-        cells = line.split(",")
+    header: CsvLine | None = None
+    for line in csv_lines(path, "spectrum"):
         try:
-            wavelength, value = float(cells[0]), float(cells[1])
-        except (ValueError, IndexError):
-            if not pairs and not header_seen:
-                header_seen = True
+            wavelength, value = line.value(0), line.value(1)
+        except ValueError as error:
+            if not pairs and header is None:
+                header = line
                 continue
-            raise ValueError(f"{path}:{number}: expected wavelength in nm and a value, as in `532, 1.0`") from None
+            example = "expected wavelength in nm and a value, as in `532, 1.0`"
+            raise ValueError(f"{path}:{line.number}: {example} ({error})") from None
+        if header is not None:
+            within(path, header, line)
         if not (np.isfinite(wavelength) and np.isfinite(value)):
-            raise ValueError(f"{path}:{number}: wavelength and value must be finite numbers")
+            raise ValueError(f"{path}:{line.number}: wavelength and value must be finite numbers")
         pairs.append((wavelength, value))
+        if len(pairs) > _MOST_PAIRS:
+            raise ValueError(f"{path}:{line.number}: more than {_MOST_PAIRS} lines")
     if len(pairs) < 2:
         raise ValueError(f"{path}: a spectrum needs at least two lines of wavelength in nm and value")
     return pairs

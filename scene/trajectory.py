@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import csv
 import math
 from pathlib import Path
 from typing import Annotated, Any, Literal
@@ -11,11 +10,14 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import BeforeValidator, Field, ValidationInfo
 
+from conespot.scene.csv_lines import CsvLine, columns, csv_lines, within
 from conespot.scene.model import Model, unknown_name
 from conespot.scene.quantity import Length, parse_quantity
 
 Array = NDArray[np.float64]
 Point = tuple[Length, Length, Length]
+_COLUMNS = ("x_mm", "y_mm", "z_mm")
+_MOST_POINTS = 100_000
 
 
 class Box(Model):
@@ -123,7 +125,7 @@ class Waypoints(Model):
 
     kind: Literal["csv"] = "csv"
     file: str
-    points: tuple[Point, ...] = Field((), max_length=100_000, validate_default=False)
+    points: tuple[Point, ...] = Field((), max_length=_MOST_POINTS, validate_default=False)
 
     def positions(self, poses: int, rng: np.random.Generator) -> Array:
         """Tip positions `[poses, 3]` [mm]. Raises ValueError if the file has fewer rows."""
@@ -134,26 +136,23 @@ class Waypoints(Model):
 
 def _read_points(path: Path) -> list[Point]:
     """The positions in a CSV file with the columns x_mm, y_mm, z_mm. Raises ValueError with file and line."""
-    try:
-        if path.stat().st_size > 20_000_000:
-            raise ValueError(f"{path}: larger than 20 MB, not a list of positions")
-        with path.open(newline="", encoding="utf-8") as stream:
-            reader = csv.DictReader(stream)
-            missing = {"x_mm", "y_mm", "z_mm"} - set(reader.fieldnames or ())
-            if missing:
-                raise ValueError(f"{path}:1: no column {', '.join(sorted(missing))}; a header x_mm,y_mm,z_mm is needed")
-            points: list[Point] = []
-            for row in reader:
-                try:
-                    x, y, z = (float(row[k]) for k in ("x_mm", "y_mm", "z_mm"))
-                    points.append(
-                        (parse_quantity(x, "length"), parse_quantity(y, "length"), parse_quantity(z, "length"))
-                    )
-                except (TypeError, ValueError):
-                    raise ValueError(f"{path}:{reader.line_num}: x_mm, y_mm, z_mm must be finite numbers") from None
-    except (OSError, UnicodeDecodeError, csv.Error) as error:
-        raise ValueError(f"{path}: cannot be read as CSV ({error})") from None
+    lines = csv_lines(path, "list of positions")
+    header = next(lines, CsvLine(1, ()))
+    x, y, z = columns(path, header, _COLUMNS)
+    points: list[Point] = []
+    for line in lines:
+        within(path, header, line)
+        try:
+            points.append((_millimetres(line, x), _millimetres(line, y), _millimetres(line, z)))
+        except ValueError as error:
+            raise ValueError(f"{path}:{line.number}: x_mm, y_mm, z_mm must be finite numbers ({error})") from None
+        if len(points) > _MOST_POINTS:
+            raise ValueError(f"{path}:{line.number}: more than {_MOST_POINTS} positions")
     return points
+
+
+def _millimetres(line: CsvLine, column: int) -> float:
+    return parse_quantity(line.value(column), "length")
 
 
 Trajectory = Annotated[

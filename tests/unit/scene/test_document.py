@@ -36,7 +36,7 @@ BAD = {
     "a: \x00": "x.yaml: not valid YAML",
     "surface: {bumps: [{x: 20 mm, y: 0 mm}]}": "outside the eye",
     "camera: {height: 20 mm}": "above the eye",
-    "[" * 5000: "x.yaml: nested too deeply",
+    "[" * 5000: "x.yaml:1: nested too deeply",
     "preset: nopreset": "nopreset: no such scene preset",
 }
 
