@@ -56,13 +56,8 @@ class Bench:
         """Render the unit's pose once, expose it at every power, localize every frame with every localizer."""
         group = self._plan.groups[unit.group]
         pose = group.pose(unit.pose)
-        renderer, exposure = self._scene(group)
-        background = renderer.background(pose)
-        if group.scene.instrument.shaft is not None:
-            from conespot.render import Exposure
-
-            exposure = Exposure(background, exposure.sensor)
-        tiles = self._tiles(renderer, unit)
+        exposure, background = self._exposure(group, pose)
+        tiles = self._tiles(self._scene(group)[0], unit)
         findings = []
         for _, alike in itertools.groupby(group.cases, key=lambda case: case.frame):
             cases = list(alike)
@@ -77,6 +72,25 @@ class Bench:
                     self._keep(f"{cases[0].frame}-{unit.pose:05d}", cases[0], pose, radiance, image)
         return Record(unit=unit.key, by=self._by, findings=tuple(findings))
 
+    def look(self, unit: Unit, case: Case) -> tuple[AnyImage, dict[str, Outcome]]:
+        """One case's frame of a unit, and what each of its localizers answers: what `measure` makes its findings of."""
+        group = self._plan.groups[unit.group]
+        exposure, _ = self._exposure(group, group.pose(unit.pose))
+        tiles = self._tiles(self._scene(group)[0], unit)
+        image = exposure.frame(tiles, case.scene.power.value, frame_seed(unit, case))
+        unlit = self._unlit(unit, case, exposure, tiles)
+        return image, {name: self._located(unit, case, image, name, unlit) for name in case.localizers}
+
+    def _exposure(self, group: Group, pose: Pose) -> tuple[Exposure, NDArray[np.float32]]:
+        """What exposes a pose's frames, and the background: a shaft lies over it."""
+        renderer, exposure = self._scene(group)
+        background = renderer.background(pose)
+        if group.scene.instrument.shaft is not None:
+            from conespot.render import Exposure
+
+            exposure = Exposure(background, exposure.sensor)
+        return exposure, background
+
     def _findings(self, unit: Unit, case: Case, image: AnyImage, unlit: Reference | None) -> list[Finding]:
         """What the case's localizers find in a frame."""
         bound = self._bound(case, self._plan.groups[unit.group].pose(unit.pose))
@@ -84,7 +98,7 @@ class Bench:
         for localizer in case.localizers:
             outcome = self._located(unit, case, image, localizer, unlit)
             found.append(
-                _finding(case, localizer, outcome, bound if find_localizer(localizer).takes_knowledge else None)
+                finding(case, localizer, outcome, bound if find_localizer(localizer).takes_knowledge else None)
             )
         return found
 
@@ -180,7 +194,8 @@ class Bench:
         write_preview(self._frames / f"{name}.png", image, case.scene.sensor.full_scale)
 
 
-def _finding(case: Case, localizer: str, found: Outcome, bound: float | None) -> Finding:
+def finding(case: Case, localizer: str, found: Outcome, bound: float | None) -> Finding:
+    """An answer as a run keeps it."""
     if isinstance(found, LocalizationFailure):
         return Finding(case=case.key, localizer=localizer, reason=found.reason[:1000], bound=bound)
     return Finding(

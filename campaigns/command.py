@@ -127,6 +127,10 @@ def _parser() -> argparse.ArgumentParser:
     check.add_argument("--campaign", metavar="FILE", help="expect what this campaign does (default: the run's own)")
     check.add_argument("--junit", type=Path, metavar="FILE", help="write the verdicts as JUnit XML")
     check.add_argument("--markdown", type=Path, metavar="FILE", help="write the verdicts as a markdown table")
+    debug = add("debug", _debug, "render one pose of a run again, and draw what its localizers saw")
+    debug.add_argument("folder", type=Path, metavar="RUN")
+    debug.add_argument("case", metavar="CASE", help="its key, the beginning of it, or its line in cases.jsonl")
+    debug.add_argument("pose", type=int, metavar="POSE", help="its number, as in errors.csv")
     doctor = add("doctor", _doctor, "say what this machine renders with, and prove it")
     doctor.add_argument("--clear-cache", action="store_true", help="remove the backgrounds kept between runs instead")
     return parser
@@ -235,6 +239,14 @@ def _check(options: argparse.Namespace) -> Ending:
     checked = check_run(options.folder, options.campaign, options.junit, options.markdown)
     _say(checked.text)
     return _complain(f"{checked.missed} expectations missed", Ending.FAILED) if checked.missed else Ending.DONE
+
+
+def _debug(options: argparse.Namespace) -> Ending:
+    from conespot.campaigns.debug import debug
+
+    for line in debug(options.folder, options.case, options.pose):
+        _say(line)
+    return Ending.DONE
 
 
 def _say_results(folder: Path) -> None:

@@ -7,6 +7,7 @@ the estimated tip, whatever way the cones point. Their rotation errors are those
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -28,13 +29,67 @@ from conespot.scene import Pose, Scene
 from conespot.scene.pose import rot_x, rot_y
 
 
+@dataclass(frozen=True, eq=False)
+class Steps:
+    """What a published method sees before it chooses: its mask, the outlines it cuts out, and two cones over each.
+
+    `outlines` are pixel indices (column, row) `[N, 2]`; there may be fewer `pairs` than outlines, and none of either.
+    """
+
+    mask: Mask
+    outlines: tuple[Contour, ...]
+    pairs: tuple[Candidates, ...]
+
+
+@dataclass(frozen=True)
+class Method:
+    """A published method: how it parts light from dark, an outline to candidates, and of several positions one."""
+
+    segment: Callable[[Grey], Mask]
+    reconstruct: Callable[[Contour, Scene], Candidates | LocalizationFailure]
+    unite: Callable[..., Array]
+
+    def localize(self, image: AnyImage, scene: Scene, truth: Pose | None = None) -> Outcome:
+        """The answer; with a `truth` the candidates nearest to it are taken."""
+        patches = outlines(self.segment(grey8(image, scene)), len(scene.spotlights))
+        if isinstance(patches, LocalizationFailure):
+            return patches
+        pairs: list[Candidates] = []
+        for patch in patches:
+            pair = self.reconstruct(patch, scene)
+            if isinstance(pair, LocalizationFailure):
+                return pair
+            pairs.append(pair)
+        if truth is not None:
+            positions = np.stack([_nearest(pair.apexes, truth.apex) for pair in pairs])
+        elif len(pairs) == 1:
+            if pairs[0].flattening < PUBLISHED.round_px * scene.camera.pixel_pitch:
+                return LocalizationFailure(NEAR_CIRCLE)
+            positions = from_rcm(pairs[0], scene)[None, :]
+        else:
+            positions = least_spread(np.stack([pair.apexes for pair in pairs]))
+        apex = self.unite(positions, axis=0)
+        spread = float(np.sqrt(np.mean(np.sum((positions - positions.mean(axis=0)) ** 2, axis=-1))))
+        axis = Pose.through(apex, scene.instrument.rcm).axis
+        return Localization(apex, axis, spread_mm=spread if len(pairs) > 1 else None)
+
+    def steps(self, image: AnyImage, scene: Scene) -> Steps:
+        """What `localize` sees on its way, once more, to be looked at."""
+        mask = self.segment(grey8(image, scene))
+        patches = outlines(mask, len(scene.spotlights))
+        if isinstance(patches, LocalizationFailure):
+            return Steps(mask, (), ())
+        pairs = [self.reconstruct(patch, scene) for patch in patches]
+        return Steps(mask, tuple(patches), tuple(pair for pair in pairs if isinstance(pair, Candidates)))
+
+
 def paper(image: AnyImage, scene: Scene) -> Outcome:
     """The paper's text: Otsu, Eqs. 1-7, the ellipse in the plane of the outline, Eqs. 22-24.
 
     One spotlight: the candidate whose cone comes from the RCM. Several: of all combinations of candidates the one of
     smallest spread, and of its positions the median of every coordinate (3.5).
     """
-    return _localize(image, scene, otsu_mask, text_candidates, np.median, None)
+    return METHODS["paper"].localize(image, scene)
 
 
 def paper_code(image: AnyImage, scene: Scene) -> Outcome:
@@ -42,17 +97,17 @@ def paper_code(image: AnyImage, scene: Scene) -> Outcome:
 
     Of several positions the code takes the one nearest their mean.
     """
-    return _localize(image, scene, coded_mask, _integer_candidates, _nearest_mean, None)
+    return METHODS["paper-code"].localize(image, scene)
 
 
 def paper_code_float(image: AnyImage, scene: Scene) -> Outcome:
     """`paper_code` without its cutting of the outline to whole pixels, to see what that costs."""
-    return _localize(image, scene, coded_mask, _float_candidates, _nearest_mean, None)
+    return METHODS["paper-code-float"].localize(image, scene)
 
 
 def paper_code_oracle(image: AnyImage, scene: Scene, truth: Pose) -> Outcome:
     """The authors' code with their answer to the ambiguity: of each pair the candidate nearest the true tip."""
-    return _localize(image, scene, coded_mask, _integer_candidates, _nearest_mean, truth)
+    return METHODS["paper-code-oracle"].localize(image, scene, truth)
 
 
 def text_candidates(outline: Contour, scene: Scene) -> Candidates | LocalizationFailure:
@@ -74,37 +129,6 @@ def _integer_candidates(outline: Contour, scene: Scene) -> Candidates | Localiza
 
 def _float_candidates(outline: Contour, scene: Scene) -> Candidates | LocalizationFailure:
     return coded_candidates(outline, scene, whole_pixels=False)
-
-
-def _localize(
-    image: AnyImage,
-    scene: Scene,
-    segment: Callable[[Grey], Mask],
-    reconstruct: Callable[[Contour, Scene], Candidates | LocalizationFailure],
-    unite: Callable[..., Array],
-    truth: Pose | None,
-) -> Outcome:
-    patches = outlines(segment(grey8(image, scene)), len(scene.spotlights))
-    if isinstance(patches, LocalizationFailure):
-        return patches
-    pairs: list[Candidates] = []
-    for patch in patches:
-        pair = reconstruct(patch, scene)
-        if isinstance(pair, LocalizationFailure):
-            return pair
-        pairs.append(pair)
-    if truth is not None:
-        positions = np.stack([_nearest(pair.apexes, truth.apex) for pair in pairs])
-    elif len(pairs) == 1:
-        if pairs[0].flattening < PUBLISHED.round_px * scene.camera.pixel_pitch:
-            return LocalizationFailure(NEAR_CIRCLE)
-        positions = from_rcm(pairs[0], scene)[None, :]
-    else:
-        positions = least_spread(np.stack([pair.apexes for pair in pairs]))
-    apex = unite(positions, axis=0)
-    spread = float(np.sqrt(np.mean(np.sum((positions - positions.mean(axis=0)) ** 2, axis=-1))))
-    axis = Pose.through(apex, scene.instrument.rcm).axis
-    return Localization(apex, axis, spread_mm=spread if len(pairs) > 1 else None)
 
 
 def from_rcm(pair: Candidates, scene: Scene) -> Array:
@@ -139,3 +163,13 @@ def _nearest_mean(positions: Array, axis: int) -> Array:
 def _angle(a: Array, b: Array) -> Array:
     cross = np.linalg.norm(np.cross(a, b), axis=-1)
     return np.arctan2(cross, np.sum(a * b, axis=-1))
+
+
+_CODED = Method(coded_mask, _integer_candidates, _nearest_mean)
+#: the published methods by the names of their localizers
+METHODS: dict[str, Method] = {
+    "paper": Method(otsu_mask, text_candidates, np.median),
+    "paper-code": _CODED,
+    "paper-code-float": Method(coded_mask, _float_candidates, _nearest_mean),
+    "paper-code-oracle": _CODED,
+}

@@ -6,8 +6,11 @@ import subprocess
 import sys
 import time
 
+import cv2
 import pandas as pd
 import pytest
+
+from conespot.campaigns.command import main
 
 CAMPAIGN = [sys.executable, "-m", "conespot"]
 # many samples: a pose must take long enough to be interrupted
@@ -156,6 +159,36 @@ def test_report_makes_everything_again_from_the_journal(folder, straight):
     assert (run / "errors.csv").read_bytes() == rows
     assert (run / "report.html").exists()
     assert done.stdout == first.stdout
+
+
+def test_one_pose_alone_gives_the_runs_own_row_and_pictures_of_what_was_seen(straight, capsys):
+    run = straight[0]
+    rows = pd.read_csv(run / "errors.csv")
+    case = rows["case"].unique()[1]
+    assert main(["debug", str(run), case[:8], "3"]) == 0
+    first, true, said, files = capsys.readouterr().out.splitlines()
+    (row,) = rows[(rows["case"] == case) & (rows["pose"] == 3)].to_dict("records")
+    assert f"case {case}, pose 3: random, single, {row['power_w']:g} W" in first
+    assert f"{row['true_x_mm']:.4f} {row['true_y_mm']:.4f} {row['true_z_mm']:.4f} mm" in true
+    assert said.endswith("; the same as the run's row")
+    assert (f"{1e3 * row['position_error_mm']:.1f} um off" if row["status"] == "ok" else row["reason"]) in said
+    assert files.endswith("frame.png, paper.png")
+    rendered = cv2.imread(str(run / "debug" / f"{case}-3" / "frame.png"), cv2.IMREAD_UNCHANGED)
+    assert rendered.shape == (300, 300)
+    assert rendered.max() > 200
+
+
+@pytest.mark.parametrize(
+    ("case", "pose", "says"),
+    [
+        ("2", "10", "pose 10: the case has poses 0 to 9"),
+        ("xyz", "0", "xyz: is no case; "),
+        ("", "0", "is the beginning of several cases"),
+    ],
+)
+def test_one_pose_of_no_case_is_refused(straight, capsys, case, pose, says):
+    assert main(["debug", str(straight[0]), case, pose]) == 2
+    assert says in capsys.readouterr().err
 
 
 def test_frames_are_kept_when_asked_for(folder):
