@@ -11,10 +11,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from conespot.render import readout as emva
+from conespot.render import recording
 from conespot.render.tile import Crop, Tile
 from conespot.scene import srgb
 from conespot.scene.emva import Emva
-from conespot.scene.sensor import Linear, Sensor, Srgb8
+from conespot.scene.sensor import Linear, Recorded, Sensor, Srgb8
 
 #: of the table of sRGB values, fine enough that few hold two of them
 _BINS = 2**16
@@ -76,9 +77,11 @@ class Exposure:
     def __init__(self, background: NDArray[np.float32], sensor: Sensor) -> None:
         self._background = background
         self.sensor = sensor
-        match sensor:
-            case Srgb8() | Linear():
-                self._encoded = encode(background, sensor)
+        self._recorder = sensor if isinstance(sensor, Recorded) else None
+        self._camera = sensor.camera if isinstance(sensor, Recorded) else sensor
+        match self._camera:
+            case Srgb8() | Linear() as plain:
+                self._encoded = encode(background, plain)
                 self._canvas: Pixels | None = None  #: a copy of it, to paint on
             case Emva():
                 pass
@@ -91,17 +94,21 @@ class Exposure:
         `seed` decides the noise of an EMVA 1288 camera; a Bayer camera's raw frame is interpolated to three channels.
         """
         lit = [tile for tile in tiles if tile.radiance.size]
-        match self.sensor:
+        match self._camera:
             case Emva() as camera:
-                return self._noisy(camera, lit, power_w, seed)
+                return self._kept(self._noisy(camera, lit, power_w, seed))
             case Srgb8() | Linear() as sensor:
                 image = self._encoded.copy()
                 if lit:
                     crop, radiance = self._lit(lit, power_w)
                     image[crop.slices] = encode(radiance, sensor)
-                return image[..., 0] if image.shape[-1] == 1 else image
+                return self._kept(image[..., 0] if image.shape[-1] == 1 else image)
             case unknown:
                 assert_never(unknown)
+
+    def _kept(self, image: Pixels) -> Pixels:
+        """The image as the recorder leaves it, where there is one."""
+        return image if self._recorder is None else recording.recorded(image, self._recorder)
 
     @contextlib.contextmanager
     def shown(self, tiles: Sequence[Tile], power_w: float, seed: int = 0) -> Iterator[Pixels]:
@@ -110,9 +117,9 @@ class Exposure:
         Without noise no frame is copied: what the tiles touch is exposed, and taken back.
         """
         lit = [tile for tile in tiles if tile.radiance.size]
-        match self.sensor:
+        match self._camera:
             case Emva() as camera:
-                yield self._noisy(camera, lit, power_w, seed)
+                yield self._kept(self._noisy(camera, lit, power_w, seed))
             case Srgb8() | Linear() as sensor:
                 # whoever looks at a second frame meanwhile gets a canvas of its own
                 canvas = self._encoded.copy() if self._canvas is None else self._canvas
@@ -124,7 +131,7 @@ class Exposure:
                         canvas[crop.slices] = encode(radiance, sensor)
                     image = canvas[..., 0] if canvas.shape[-1] == 1 else canvas[:]
                     image.flags.writeable = False
-                    yield image
+                    yield self._kept(image)
                 finally:
                     for where in touched:
                         canvas[where] = self._encoded[where]
@@ -134,10 +141,10 @@ class Exposure:
 
     def dark(self, tiles: Sequence[Tile], power_w: float, seed: int = 0) -> Pixels:
         """The image without spotlights, at the exposure of the frame with these tiles at `power_w` [W]."""
-        match self.sensor:
+        match self._camera:
             case Emva() as camera:
                 lit = [tile for tile in tiles if tile.radiance.size]
-                return self._digital(self._for_frame(camera, lit, power_w), self._background, seed)
+                return self._kept(self._digital(self._for_frame(camera, lit, power_w), self._background, seed))
             case Srgb8() | Linear():
                 return self.frame((), 0.0)
             case unknown:
@@ -151,11 +158,12 @@ class Exposure:
 
     def metered(self, tiles: Sequence[Tile], power_w: float) -> Sensor:
         """The sensor with the exposure time that its metering asks for in this frame, and keeps; else as it is."""
-        match self.sensor:
+        match self._camera:
             case Emva() as camera:
-                return self._metered(camera, [tile for tile in tiles if tile.radiance.size], power_w)
-            case Srgb8() | Linear() as sensor:
-                return sensor
+                timed = self._metered(camera, [tile for tile in tiles if tile.radiance.size], power_w)
+                return timed if self._recorder is None else self._recorder.model_copy(update={"camera": timed})
+            case Srgb8() | Linear():
+                return self.sensor
             case unknown:
                 assert_never(unknown)
 

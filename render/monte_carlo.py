@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from conespot.scene.emva import Emva
-from conespot.scene.sensor import AnySensor, Linear, Srgb8
+from conespot.scene.sensor import AnySensor, Linear, Recorded, Srgb8
 
 #: samples a pixel that are enough in the smooth interior of a patch, and tell where they are not
 PILOT = 4
@@ -34,6 +34,8 @@ def tolerance(sensor: AnySensor) -> float:
             return 0.5 / sensor.full_scale
         case Emva():
             return _SHARE * math.sqrt(sensor.saturation + sensor.read_noise**2) / sensor.saturation
+        case Recorded():
+            return tolerance(sensor.camera)
         case _:
             assert_never(sensor)
 

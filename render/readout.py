@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import ndtri, pdtr, pdtrc
 
+from conespot.render.fixed_pattern import unevenness
 from conespot.scene.emva import Emva
 
 #: below this mean [e-] the Poisson distribution is inverted exactly; above, its skewness-corrected normal form is
@@ -38,9 +39,15 @@ def expose(
     for first in range(0, len(signal), _BAND):
         band = mosaic(signal[first : first + _BAND], row + first, column)
         mean = band.astype(np.float32) * np.float32(sensor.electrons_per_signal)
+        uneven = None
+        if sensor.fixed_pattern is not None:
+            uneven = unevenness(sensor.fixed_pattern, row + first, column, (len(band), band.shape[1]))
+            mean = mean * uneven.response + uneven.dark_current * np.float32(sensor.exposure_time)
         mean += np.float32(sensor.dark_current * sensor.exposure_time)
         shot, read = normal_pairs(seed, row + first, column, mean.shape)
         electrons = np.minimum(poisson(mean, shot), np.float32(sensor.full_well))
+        if uneven is not None:
+            electrons += uneven.offset
         digital = np.float32(sensor.gain) * (electrons + np.float32(sensor.read_noise) * read)
         digital += np.float32(sensor.black_level + 0.5)
         values[first : first + _BAND] = np.clip(np.floor(digital), 0, sensor.full_scale)

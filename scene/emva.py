@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field, model_validator
 
+from conespot.scene.fixed_pattern import FixedPattern
 from conespot.scene.model import Model
 from conespot.scene.noise import SensorNoise
 from conespot.scene.quantity import Length, Seconds, Wavelength, format_quantity
@@ -116,6 +117,7 @@ class Emva(Model):
     gain: float = Field(0.3, gt=0.0, le=1e3)  #: K [DN/e-]
     black_level: float = Field(32.0, ge=0.0)  #: [DN]
     filters: tuple[Filter, ...] = Field((), max_length=8)
+    fixed_pattern: FixedPattern | None = None
 
     @model_validator(mode="after")
     def _room_for_signal(self) -> Emva:
@@ -133,7 +135,8 @@ class Emva(Model):
         """How radiance becomes values, in words as tables state it."""
         exposed = self.metering.words if self.metering else f"exposed {1e3 * self.exposure_time:g} ms"
         filters = "".join(f", {optical.words}" for optical in self.filters)
-        return f"{self.chip} (EMVA 1288), linear, {self.bits} bit, f/{self.f_number:g}, {exposed}{filters}"
+        pattern = "" if self.fixed_pattern is None else f", fixed pattern of serial {self.fixed_pattern.serial}"
+        return f"{self.chip} (EMVA 1288), linear, {self.bits} bit, f/{self.f_number:g}, {exposed}{filters}{pattern}"
 
     @property
     def saturation(self) -> float:
@@ -148,9 +151,10 @@ class Emva(Model):
 
     @property
     def noise(self) -> SensorNoise:
-        """Shot and read noise where the largest value is white."""
-        levels = self.full_scale
-        return SensorNoise(levels=levels, electrons=levels / self.gain, read=self.read_noise)
+        """Shot and read noise where the largest value is white; to who has one frame a fixed pattern is noise too."""
+        levels, pattern = self.full_scale, self.fixed_pattern or FixedPattern()
+        read = math.hypot(self.read_noise, pattern.dsnu.total)
+        return SensorNoise(levels=levels, electrons=levels / self.gain, read=read, uneven=pattern.prnu.total)
 
     def decode(self, share: NDArray[np.float64]) -> NDArray[np.float64]:
         """Signals [white] of shares of the largest value, any shape: without the black level."""

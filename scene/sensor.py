@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 from collections.abc import Hashable
 from typing import Annotated, Literal, Protocol
 
@@ -9,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field
 
-from conespot.scene import srgb
+from conespot.scene import jpeg, srgb
 from conespot.scene.emva import EMVA_PRESETS, Emva, Metering
 from conespot.scene.model import Model, named
 from conespot.scene.noise import SensorNoise
@@ -167,17 +168,99 @@ class Linear(Model):
         return share
 
 
-AnySensor = Srgb8 | Linear | Emva
-SENSORS: dict[str, AnySensor] = {
+SingleFrame = Srgb8 | Linear | Emva
+SENSORS: dict[str, SingleFrame] = {
     "srgb8": Srgb8(),
     "srgb8-colour": Srgb8(colour=True),
     "linear": Linear(),
     **EMVA_PRESETS,
 }
+#: levels that compression may move a clipped value down
+_RINGING = 2.0
+
+
+class Recorded(Model):
+    """A camera whose frames went through a video recorder: eight bits, and JPEG of a `quality`.
+
+    Values of a linear camera get the sRGB transfer first. In `limited` range black is 16 and white 235, and a frame
+    shows these codes as they are. `chroma` says whether colours keep their resolution (4:4:4) or half of it (4:2:0).
+    """
+
+    kind: Literal["recorded"] = "recorded"
+    camera: Annotated[Annotated[SingleFrame, Field(discriminator="kind")], named(SENSORS, "sensor")]
+    quality: int = Field(90, ge=1, le=100)  #: libjpeg's
+    chroma: Literal["4:2:0", "4:4:4"] = "4:2:0"
+    range: Literal["full", "limited"] = "full"
+
+    @property
+    def full_scale(self) -> int:
+        """Largest pixel value that a file can hold."""
+        return 255
+
+    @property
+    def black_code(self) -> int:
+        """Code of the camera's value 0."""
+        return 16 if self.range == "limited" else 0
+
+    @property
+    def codes(self) -> int:
+        """Codes from the camera's value 0 to its largest."""
+        return 219 if self.range == "limited" else 255
+
+    def code(self, share: Array) -> Array:
+        """Codes, not rounded, of shares of the camera's largest value, any shape."""
+        light = share if isinstance(self.camera, Srgb8) else srgb.encoded(np.asarray(share, float))
+        return np.asarray(self.black_code + self.codes * light)
+
+    @property
+    def black_level(self) -> float:
+        """Pixel value without any light."""
+        return float(self.code(np.array(self.camera.black_level / self.camera.full_scale)))
+
+    @property
+    def clips_from(self) -> float:
+        """Share from which on a pixel is only a lower bound of its light: compression may have darkened it a little."""
+        return (float(self.code(np.array(self.camera.clips_from))) - _RINGING) / self.full_scale
+
+    @property
+    def noise(self) -> SensorNoise:
+        """The camera's, the codes' and what the compression rounds where an image is busy."""
+        rounding = jpeg.rounding_error(self.quality)
+        return dataclasses.replace(self.camera.noise, levels=self.codes, srgb=True, compression=rounding)
+
+    @property
+    def responses(self) -> dict[str, Curve] | None:
+        """The camera's."""
+        return self.camera.responses
+
+    @property
+    def metering(self) -> Metering | None:
+        """The camera's."""
+        return self.camera.metering
+
+    @property
+    def words(self) -> str:
+        """How radiance becomes values, in words as tables state it."""
+        chroma = f" {self.chroma}" if self.responses and len(self.responses) > 1 else ""
+        return f"{self.camera.words}, recorded as JPEG {self.quality}{chroma}, {self.range} range"
+
+    def decode(self, share: Array) -> Array:
+        """Signals [white] of shares of the largest code, any shape.
+
+        >>> Recorded(camera=Linear(), range="limited").decode(np.array([16.0, 235.0]) / 255.0).round(12).tolist()
+        [0.0, 1.0]
+        """
+        value = (share * self.full_scale - self.black_code) / self.codes
+        return self.camera.decode(value if isinstance(self.camera, Srgb8) else srgb.decoded(value))
+
+
+AnySensor = SingleFrame | Recorded
 
 
 def sensor_name(sensor: AnySensor) -> str:
-    """The name of a preset, or the kind (for a camera its chip) of a sensor of one's own."""
+    """The name of a preset, or the kind (a camera's chip) of a sensor of one's own; for a recorder its camera's."""
+    if isinstance(sensor, Recorded):
+        return f"{sensor_name(sensor.camera)}, JPEG {sensor.quality}"
     alike = (name for name, known in SENSORS.items() if known == sensor)
     return next(alike, sensor.chip if sensor.kind == "emva" else sensor.kind)
 
