@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import pandas as pd
 
@@ -21,7 +22,7 @@ class Block:
     lines: tuple[tuple[str, ...], ...]
     notes: tuple[str, ...]
 
-    @property
+    @cached_property  # a template asks for every line
     def flush_right(self) -> tuple[bool, ...]:
         """Which columns hold numbers."""
         columns = list(zip(*self.lines, strict=True)) or [()] * len(self.header)

@@ -1,0 +1,106 @@
+"""A run of 10^6 rows: how long its plan, its status and its report take, and how much memory each of them needs.
+
+`python benchmarks/million_rows.py [FOLDER] [--powers N] [--poses N]` makes a campaign of that many powers and poses for
+two localizers, a run folder of made-up answers, every tenth a failure, and prints a line for each step. Every step is a
+process of its own, so that its peak is its own.
+"""
+
+from __future__ import annotations
+
+import argparse
+import resource
+import subprocess
+import sys
+import tempfile
+import time
+from collections.abc import Callable, Generator, Iterable
+from pathlib import Path
+
+import numpy as np
+
+from conespot.campaigns.command import main as campaign
+from conespot.campaigns.plan import Plan, Unit, make_plan
+from conespot.campaigns.row import Finding, Record
+from conespot.campaigns.schema import read_campaign
+from conespot.campaigns.store import open_store
+
+LOCALIZERS = ("paper", "paper-code")
+
+
+def answers(plan: Plan, units: Iterable[Unit]) -> Generator[Record]:
+    """Records that look like those of a bench: 20 um of error, and every tenth a failure."""
+    noise = np.random.default_rng(1)
+    for unit in units:
+        group = plan.groups[unit.group]
+        pose = group.pose(unit.pose)
+        axis = tuple(map(float, pose.axis))
+        count = group.rows
+        tips = (pose.apex + noise.normal(0.0, 0.02, (count, 3))).tolist()
+        lost = (noise.random(count) < 0.1).tolist()
+        pairs = [(case.key, name) for case in group.cases for name in case.localizers]
+        yield Record(
+            unit=unit.key,
+            findings=tuple(
+                Finding(case=case, localizer=name, reason="no spotlight was found")
+                if lost[i]
+                else Finding(case=case, localizer=name, apex=tuple(tips[i]), axis=axis)
+                for i, (case, name) in enumerate(pairs)
+            ),
+        )
+
+
+def _fill(folder: Path) -> None:
+    document = read_campaign(str(folder / "c.yaml"))
+    plan = make_plan(document)
+    with open_store(folder / "run", plan, document) as store:
+        for record in answers(plan, plan.units()):
+            store.append(record)
+
+
+STEPS: dict[str, Callable[[Path], object]] = {
+    "plan": lambda folder: campaign(["plan", str(folder / "c.yaml")]),
+    "fill": _fill,
+    "status": lambda folder: campaign(["status", str(folder / "run")]),
+    "count": lambda folder: ((folder / "run/progress.json").write_text(_stale(folder)), STEPS["status"](folder)),
+    "report": lambda folder: campaign(["report", str(folder / "run")]),
+}
+
+
+def _stale(folder: Path) -> str:
+    return (folder / "run/progress.json").read_text().replace('"journal_bytes":', '"journal_bytes":1')
+
+
+def main() -> None:
+    """Print time and peak of each step."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("folder", nargs="?", type=Path)
+    parser.add_argument("--powers", type=int, default=1000)
+    parser.add_argument("--poses", type=int, default=500)
+    parser.add_argument("--step", choices=list(STEPS))
+    options = parser.parse_args()
+    if options.step:
+        STEPS[options.step](options.folder)
+        return
+    with tempfile.TemporaryDirectory() as temporary:
+        folder = options.folder or Path(temporary)
+        folder.mkdir(exist_ok=True)
+        powers = ", ".join(f"{0.001 * (i + 1):.3f} W" for i in range(options.powers))
+        (folder / "c.yaml").write_text(
+            f"scene: paper\nposes: {options.poses}\nlocalizers: [{', '.join(LOCALIZERS)}]\n"
+            f"sweep: {{scene.power.value: [{powers}]}}\n"
+        )
+        for step in STEPS:
+            begin = time.perf_counter()
+            before = resource.getrusage(resource.RUSAGE_CHILDREN).ru_maxrss
+            done = subprocess.run(
+                [sys.executable, __file__, str(folder), "--step", step], check=True, stdout=subprocess.DEVNULL
+            )
+            assert done.returncode == 0
+            peak = resource.getrusage(resource.RUSAGE_CHILDREN).ru_maxrss
+            grown = f"{peak / 1024:.0f} MB" if peak > before else f"at most {before / 1024:.0f} MB"
+            sys.stdout.write(f"{step:8} {time.perf_counter() - begin:6.1f} s  peak {grown}\n")
+            sys.stdout.flush()
+
+
+if __name__ == "__main__":
+    main()
