@@ -27,6 +27,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     if arguments is None:
         interruption.listen()
         streams.make_safe()
+        os.environ["MPLBACKEND"] = "agg"  # figures are files, whatever a notebook or a desktop has left there
     options = _parser().parse_args(arguments)
     from conespot.scene.document import InputError
 

@@ -9,6 +9,7 @@ from typing import Any
 from conespot.campaigns.schema import Campaign, Combination
 from conespot.results.columns import names as declared
 from conespot.scene.identity import digest
+from conespot.scene.illumination import light_name
 from conespot.scene.sensor import sensor_name
 from conespot.scene.spotlights import rig_name
 from conespot.scene.surface import surface_name
@@ -21,7 +22,7 @@ _STANDING: dict[str, tuple[str, Callable[[Campaign], Label]]] = {
     "trajectory": ("trajectory", lambda c: c.trajectory.kind),
     "spotlights": ("scene.spotlights", lambda c: rig_name(c.scene.spotlights)),
     "power_w": ("scene.power.value", lambda c: c.scene.power.value),
-    "illumination": ("scene.illumination", lambda c: c.scene.illumination.name),
+    "illumination": ("scene.illumination", lambda c: light_name(c.scene.illumination)),
     "surface": ("scene.surface", lambda c: surface_name(c.scene.surface)),
     "sensor": ("scene.sensor", lambda c: sensor_name(c.scene.sensor)),
     "resolution_px": ("scene.camera.resolution", lambda c: c.scene.camera.resolution),

@@ -18,14 +18,17 @@ from pydantic import BeforeValidator, Field
 from conespot.campaigns.knowledge import Knowledge
 from conespot.results.expectation import Expectations
 from conespot.scene import InputError, Scene
-from conespot.scene.document import Document, Path_, find_document, merge, read_document, read_value
+from conespot.scene.document import Document, Path_, find_document, is_file, merge, read_document, read_value
 from conespot.scene.model import Model, unknown_name
 from conespot.scene.scene import expand
+from conespot.scene.text_file import at_home
 from conespot.scene.trajectory import AnyTrajectory, Box
 
 MAX_COMBINATIONS = 10_000
 #: named in the file by a word alone, which stands for a mapping with this key
 _WORDS = {"scene": "preset", "trajectory": "kind"}
+#: keys whose value may be a file's name
+_FILES = ("file", "preset", "scene")
 _CASE = ("scene", "trajectory", "poses", "localizers", "knowledge", "samples", "edge_samples")
 _FRAMES = (*_CASE, "bounds", "frames", "sweep")
 _SWEPT = (*_CASE, "seed")
@@ -102,9 +105,11 @@ def read_campaign(name: str) -> Document:
 def override(document: Document, key: str, text: str, option: str) -> Document:
     """The campaign with `key` set to the YAML value `text`; it wins over a sweep of the same key. Raises InputError.
 
-    A dotted path goes into the scene; `sweep.` and a path replaces or adds a swept list.
+    A dotted path goes into the scene; `sweep.` and a path replaces or adds a swept list. A file that is named is one of
+    the working folder, or else of the campaign's.
     """
-    path, value = tuple(key.split(".")), read_value(text, option)
+    path = tuple(key.split("."))
+    value = _from_here(path[-1], read_value(text, option))
     sweep = document.data.get("sweep", {})
     if path[0] == "sweep":
         if not isinstance(sweep, dict):
@@ -129,6 +134,17 @@ def setting(text: str) -> tuple[str, str]:
     return key.strip(), value
 
 
+def _from_here(key: str, value: Any) -> Any:
+    """A value with the files of the working folder that it names by their absolute paths."""
+    if isinstance(value, dict):
+        return {k: _from_here(k, v) for k, v in value.items()}
+    if isinstance(value, list):
+        return [_from_here(key, item) for item in value]
+    if key in _FILES and isinstance(value, str) and is_file(at_home(Path(value))):
+        return str(at_home(Path(value)).absolute())
+    return value
+
+
 def _settled(product: dict[str, Any], path: tuple[str, ...], value: Any) -> dict[str, Any]:
     """A product without the axes that `path` settles, and with `value` laid on the items of those above it."""
     settled: dict[str, Any] = {}
@@ -147,7 +163,7 @@ def lay(data: dict[str, Any], path: tuple[str, ...], value: Any) -> dict[str, An
     nested = value
     for key in reversed(path):
         nested = {key: nested}
-    return merge(_spelt(data), _spelt(nested))
+    return merge(_spelt(data), _spelt(nested), Campaign)
 
 
 def _spelt(data: dict[str, Any]) -> dict[str, Any]:
@@ -211,10 +227,11 @@ def combinations(document: Document) -> Iterator[Combination]:
     unswept = _unswept(document)
     for axes in sweep_products(document):
         for picks in itertools.product(*(range(len(axis.items)) for axis in axes)):
-            laid, chosen = unswept, {}
-            for axis, i in zip(axes, picks, strict=True):
+            laid = unswept
+            chosen = {axis.key: axis.items[i] for axis, i in zip(axes, picks, strict=True)}
+            # what lies within another swept key is laid on that one's value, in whatever order they stand
+            for axis, i in sorted(zip(axes, picks, strict=True), key=lambda pick: len(pick[0].path)):
                 laid = _picked(laid, axis, i)
-                chosen[axis.key] = axis.items[i]
             try:
                 yield Combination(_expanded(laid).validate(Campaign), laid, chosen)
             except InputError as error:

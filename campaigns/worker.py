@@ -194,18 +194,21 @@ def _sentence(error: BaseException) -> str:
 
 @contextlib.contextmanager
 def _born() -> Iterator[None]:
-    """Processes started meanwhile use one thread and never hear of Ctrl-C: both must be so before they run anything."""
-    before = {key: os.environ.get(key) for key in _ONE_THREAD}
-    with _held_back():
-        os.environ.update(dict.fromkeys(_ONE_THREAD, "1"))
-        try:
+    """Processes started meanwhile use one thread, import nothing of ours or the standard library's from the working
+    folder, and never hear of Ctrl-C: all must be so before they run anything.
+    """
+    meanwhile = {**dict.fromkeys(_ONE_THREAD, "1"), "PYTHONSAFEPATH": "1"}
+    before = {key: os.environ.get(key) for key in meanwhile}
+    os.environ.update(meanwhile)
+    try:
+        with _held_back():
             yield
-        finally:
-            for key, value in before.items():
-                if value is None:
-                    del os.environ[key]
-                else:
-                    os.environ[key] = value
+    finally:
+        for key, value in before.items():
+            if value is None:
+                del os.environ[key]
+            else:
+                os.environ[key] = value
 
 
 @contextlib.contextmanager

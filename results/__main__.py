@@ -9,10 +9,12 @@ from pathlib import Path
 from conespot.results import tables_text, write_results
 from conespot.scene import InputError
 
+_WHAT = "Tables, figures and report of a run folder, one's own or somebody else's."
+
 
 def main(arguments: list[str] | None = None) -> int:
     """The command; returns its exit code: 2 for a run folder that cannot be used."""
-    parser = argparse.ArgumentParser(prog="python -m conespot.results", description=__doc__.partition(": ")[2])
+    parser = argparse.ArgumentParser(prog="python -m conespot.results", description=_WHAT)
     parser.add_argument("run", type=Path, help="folder with campaign.yaml and errors.parquet or errors.csv")
     run = parser.parse_args(arguments).run
     try:

@@ -6,12 +6,13 @@ Files may come from strangers: only plain data is read (no tags, no anchors), an
 from __future__ import annotations
 
 import difflib
+import functools
 import os
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from importlib import resources
 from pathlib import Path
-from typing import Any, NoReturn, TypeVar
+from typing import Annotated, Any, NoReturn, TypeVar
 
 from pydantic import BaseModel, TypeAdapter, ValidationError
 from ruamel.yaml import YAML
@@ -209,19 +210,40 @@ def _untagged(node: Node, where: str) -> Any:
     raise InputError(f"{where}: the tag {node.tag} is not read; only plain values are")
 
 
-def merge(base: dict[str, Any], over: dict[str, Any]) -> dict[str, Any]:
+def merge(base: dict[str, Any], over: dict[str, Any], model: type[BaseModel] | None = None) -> dict[str, Any]:
     """`base` with `over` laid on it: mappings are merged key by key, everything else is replaced.
 
-    A mapping that names another `kind` replaces as a whole, since its other keys mean nothing to the new kind.
+    A mapping that names another `kind` replaces as a whole, since its other keys mean nothing to the new kind. Where
+    the data are a `model`'s, a word of `base` (`sensor: linear`) is the mapping that it stands for.
     """
     result = dict(base)
     for key, value in over.items():
         old = result.get(key)
-        same_kind = (
-            isinstance(old, dict) and isinstance(value, dict) and value.get("kind", old.get("kind")) == old.get("kind")
-        )
-        result[key] = merge(old, value) if same_kind and isinstance(old, dict) else value
+        if model is not None and isinstance(old, str) and isinstance(value, dict):
+            old = _spelt_out(model, key, old)
+        if isinstance(old, dict) and isinstance(value, dict) and value.get("kind", old.get("kind")) == old.get("kind"):
+            value = merge(old, value, _part(model, key))
+        result[key] = value
     return result
+
+
+def _part(model: type[BaseModel] | None, key: str) -> type[BaseModel] | None:
+    kind = model.model_fields[key].annotation if model is not None and key in model.model_fields else None
+    return kind if isinstance(kind, type) and issubclass(kind, BaseModel) else None
+
+
+@functools.lru_cache(maxsize=256)
+def _spelt_out(model: type[BaseModel], key: str, word: str) -> dict[str, Any] | str:
+    """What a word stands for as the value of a model's key, as a file would hold it; the word if that is no mapping."""
+    field = model.model_fields.get(key)
+    if field is None:
+        return word
+    kind: Any = Annotated[field.annotation, *field.metadata]
+    try:
+        found: object = TypeAdapter(kind).validate_python(word)
+    except ValidationError:
+        return word  # whoever validates the whole says so
+    return found.model_dump(mode="json") if isinstance(found, BaseModel) else word
 
 
 def shipped(room: str, folder: str) -> dict[str, Path]:

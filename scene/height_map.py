@@ -14,6 +14,7 @@ from pydantic import BeforeValidator, Field, ValidationInfo, model_validator
 from conespot.scene.csv_lines import csv_lines
 from conespot.scene.model import Model
 from conespot.scene.quantity import Length
+from conespot.scene.text_file import at_home
 
 Array = NDArray[np.float64]
 _FEWEST, _MOST = 4, 512  #: nodes a side
@@ -142,7 +143,7 @@ def _read_matrix(path: Path) -> list[list[float]]:
 def _with_points(value: Any, info: ValidationInfo) -> Any:
     if isinstance(value, dict) and isinstance(value.get("file"), str) and "points" not in value:
         folder = Path((info.context or {}).get("folder", "."))
-        return {**value, "points": _read_matrix(folder / value["file"])}
+        return {**value, "points": _read_matrix(folder / at_home(Path(value["file"])))}
     return value
 
 

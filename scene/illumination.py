@@ -19,6 +19,7 @@ from conespot.scene.installed import described, loaded, offered, sentence
 from conespot.scene.model import Model, unknown_name
 from conespot.scene.quantity import Angle, Irradiance, Wavelength
 from conespot.scene.spectrum import Curve, read_curve, tabulated
+from conespot.scene.text_file import at_home
 
 _Visible = Annotated[Wavelength, Field(ge=300.0, le=1100.0)]
 _Name = Annotated[str, Field(pattern=r"^[\w .+-]{1,40}$")]
@@ -177,6 +178,23 @@ LIGHTS: dict[str, Light] = {
 }
 
 
+def light_name(light: Light) -> str:
+    """The name of a preset or the one its user gave; the wavelengths of a band or line that has neither.
+
+    >>> light_name(FlatBand()), light_name(FlatBand(low=500.0, high=600.0)), light_name(Line(wavelength=589.3))
+    ('white', '500-600 nm', 'line 589.3 nm')
+    """
+    if light.name in LIGHTS and light == LIGHTS[light.name]:
+        return light.name
+    unnamed = light.name in LIGHTS or light.name == type(light).model_fields["name"].default
+    if unnamed and isinstance(light, FlatBand):
+        return f"{light.low:.12g}-{light.high:.12g} nm"
+    if unnamed and isinstance(light, Line):
+        wide = "" if light.width == 1.0 else f", {light.width:.12g} nm wide"
+        return f"line {light.wavelength:.12g} nm{wide}"
+    return light.name
+
+
 def _named_light(value: Any, info: ValidationInfo) -> Any:
     if isinstance(value, str):
         if value in LIGHTS:
@@ -190,7 +208,7 @@ def _named_light(value: Any, info: ValidationInfo) -> Any:
             raise ValueError(str(error)) from None
     if isinstance(value, dict) and value.get("kind") == "csv" and "points" not in value and "file" in value:
         folder = Path((info.context or {}).get("folder", "."))
-        value = {**value, "points": read_curve(folder / str(value["file"]))}
+        value = {**value, "points": read_curve(folder / at_home(Path(str(value["file"]))))}
     return value
 
 

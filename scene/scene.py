@@ -100,10 +100,10 @@ def expand(document: Document, at: tuple[str | int, ...]) -> Document:
     if not isinstance(data, dict) or "preset" not in data:
         return document
     name = str(data["preset"])
-    beside = at_home(document.folder / name)
+    beside = document.folder / at_home(Path(name))
     path = beside if is_file(beside) else find_document(name, "scene", "presets", "scene preset")
     preset = _read_preset(path, path.stat().st_mtime_ns)
-    full = merge(preset.data, {k: v for k, v in data.items() if k != "preset"})
+    full = merge(preset.data, {k: v for k, v in data.items() if k != "preset"}, Scene)
     for key in reversed(at):
         full = {str(key): full}
     lines = {**{(*at, *k): v for k, v in preset.lines.items() if k}, **document.lines}

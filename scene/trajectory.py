@@ -13,6 +13,7 @@ from pydantic import BeforeValidator, Field, ValidationInfo
 from conespot.scene.csv_lines import CsvLine, columns, csv_lines, within
 from conespot.scene.model import Model, unknown_name
 from conespot.scene.quantity import Length, parse_quantity
+from conespot.scene.text_file import at_home
 
 Array = NDArray[np.float64]
 Point = tuple[Length, Length, Length]
@@ -179,7 +180,7 @@ def _named_trajectory(value: Any, info: ValidationInfo) -> Any:
             raise unknown_name(str(kind), list(KINDS), "trajectory")
         if kind == "csv" and isinstance(value.get("file"), str) and "points" not in value:
             folder = Path((info.context or {}).get("folder", "."))
-            points = _read_points(folder / value["file"])
+            points = _read_points(folder / at_home(Path(value["file"])))
             value = {**value, "points": [tuple(f"{c!r} mm" for c in p) for p in points]}
     return value
 
