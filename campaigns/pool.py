@@ -21,6 +21,8 @@ from conespot.campaigns.worker import POSE_LIMIT_S, Done, Lost, MakeBench, Note,
 
 #: how often an interruption is looked for [s]
 _GLANCE = 0.2
+#: a worker whose poses take longer [s] waits for us a negligible time
+_QUICK_S = 1.0
 
 
 @dataclass(frozen=True)
@@ -75,7 +77,10 @@ class _Crew:
         return (worker for worker in self._places if worker is not None)
 
     def hand_out(self) -> bool:
-        """Give every idle worker a unit, hiring where a place is empty; False when nobody is busy any more."""
+        """Give every idle worker a unit, hiring where a place is empty; False when nobody is busy any more.
+
+        One that is quick has another before it is idle, so that it need not wait for us.
+        """
         for i, worker in enumerate(self._places):
             if worker is not None and worker.unit is not None:
                 continue
@@ -84,6 +89,10 @@ class _Crew:
             if scene is not None:
                 self._places[i] = worker = worker or self._hire()
                 worker.give(self._waiting.take(scene)[0], scene)
+        for worker in self._workers():
+            idle_soon = worker.unit is not None and worker.next is None and worker.took < _QUICK_S
+            if idle_soon and worker.scene is not None and self._waiting.many(worker.scene, len(self._places)):
+                worker.give(self._waiting.take(worker.scene)[0], worker.scene)
         return any(worker.unit is not None for worker in self._workers())
 
     def wait(self) -> list[Worker]:
@@ -104,7 +113,8 @@ class _Crew:
             case Refused(reason):
                 raise RunError(f"{reason}; {REMEDY}")
             case Done(record, last):
-                self._losses.finished, worker.unit = True, None
+                self._losses.finished = True
+                worker.finish()
                 if last:
                     self._dismiss(worker)
                 return record
@@ -115,20 +125,23 @@ class _Crew:
 
     def lose_the_slow(self) -> Iterator[Record]:
         """Stop the workers whose pose takes too long, as if they had died of it; records of what is given up."""
-        for worker in self._workers():
+        for worker in list(self._workers()):
             if worker.unit is not None and worker.since > self._limit_s:
                 record = self._lose(worker, f"took longer than {self._limit_s:g} s", at_once=True)
                 if record is not None:
                     yield record
 
     def _lose(self, worker: Worker, how: str, at_once: bool = False) -> Record | None:
-        unit, worker.unit = worker.unit, None
-        self._dismiss(worker, at_once)
+        unit = worker.unit
         assert unit is not None, "only busy workers are heard"
+        worker.finish()
+        self._dismiss(worker, at_once)
         return self._losses.lost([unit], how)
 
     def _dismiss(self, worker: Worker, at_once: bool = False) -> None:
+        """Stop a worker; what it was to go on with waits again."""
         self._places[self._places.index(worker)] = None
+        self._waiting.put_back([worker.unit] if worker.unit else [])
         worker.end(at_once)
 
     def end(self) -> None:

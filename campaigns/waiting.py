@@ -25,6 +25,10 @@ class Waiting:
         """The key of the scene that a unit needs."""
         return self._plan.groups[unit.group].scene_key
 
+    def many(self, scene: str, than: int) -> bool:
+        """Whether more units of a scene wait `than` so many, none of them suspect."""
+        return len(self._scenes.get(scene, ())) > than and self._scenes[scene][0].key not in self._alone
+
     def put_back(self, units: Sequence[Unit], *, alone: bool = False) -> None:
         """Let units be the next of their scene; with `alone` no batch will hold one of them and anything else."""
         for unit in reversed(units):

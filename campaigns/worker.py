@@ -6,6 +6,7 @@ It ignores Ctrl-C, which is for the process that owns the store, and ends with t
 from __future__ import annotations
 
 import contextlib
+import math
 import multiprocessing
 import os
 import signal
@@ -92,30 +93,41 @@ Message = Done | Note | Refused | Lost
 
 
 class Worker:
-    """A process, the unit it is busy with, and the key of the scene it has loaded."""
+    """A process, the unit it is busy with, the one it will go on with, and the key of the scene it has loaded."""
 
     def __init__(self, plan: Plan, frames: Path | None, make: MakeBench) -> None:
         context = multiprocessing.get_context("spawn")
         self.connection, theirs = context.Pipe()
         self.unit: Unit | None = None
+        self.next: Unit | None = None
         self.scene: str | None = None
-        self._given = time.monotonic()
+        #: how long its last unit took [s]
+        self.took = math.inf
+        self._begun = time.monotonic()
         self._process = context.Process(target=_work, args=(theirs, plan, frames, make), daemon=True)
         with _born():
             self._process.start()
         theirs.close()
 
     def give(self, unit: Unit, scene: str) -> None:
-        """Send a unit of a scene."""
-        self.unit, self.scene, self._given = unit, scene, time.monotonic()
+        """Send a unit of a scene, to be measured at once or, if it is busy, next."""
+        if self.unit is None:
+            self.unit, self.scene, self._begun = unit, scene, time.monotonic()
+        else:
+            self.next = unit
         # a dead worker is found when its answer is awaited
         with contextlib.suppress(OSError):
             self.connection.send(unit)
 
     @property
     def since(self) -> float:
-        """How long ago it was given its unit [s]."""
-        return time.monotonic() - self._given
+        """How long ago it began its unit [s]."""
+        return time.monotonic() - self._begun
+
+    def finish(self) -> None:
+        """Its unit is finished; it goes on with the next, if it has one."""
+        self.took = self.since
+        self.unit, self.next, self._begun = self.next, None, time.monotonic()
 
     def hear(self) -> Message:
         """What it says next; waits for it."""
