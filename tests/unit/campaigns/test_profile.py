@@ -1,6 +1,7 @@
 """campaigns.profile: machines as a file states them, complaints with file, line and key, and the job scripts."""
 
 import subprocess
+from pathlib import Path
 
 import pytest
 from distributed import LocalCluster
@@ -150,3 +151,10 @@ def test_a_scheduler_over_the_open_network_is_refused_unless_the_profile_trusts_
 def test_an_address_that_is_none_is_refused():
     with pytest.raises(InputError, match="--scheduler: address: "):
         scheduler_at("cluster:8786")
+
+
+def test_the_profiles_that_the_docs_show_can_be_read(read, certificates):
+    text = (Path(__file__).parents[3] / "docs" / "cluster.md").read_text("utf-8")
+    blocks = [block.partition("```")[0] for block in text.split("```yaml\n")[1:]]
+    kinds = [read(block).kind for block in blocks if block.startswith("kind:")]
+    assert kinds == ["local", "scheduler", "slurm"]
