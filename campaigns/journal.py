@@ -22,7 +22,7 @@ from typing import IO
 from pydantic import ValidationError
 
 from conespot.campaigns.plan import Plan
-from conespot.campaigns.row import Record
+from conespot.campaigns.row import Record, Stated
 
 FILE = "journal.jsonl"
 _MARK = b'{"crc":"'  # nothing in a line looks like it: within JSON's texts a quotation mark is escaped
@@ -36,7 +36,10 @@ _LONGEST = 200_000_000
 
 @dataclass(frozen=True, slots=True)
 class Entry:
-    """A finished unit: where its line stands, what lost it, who made it, its answers and why some are failures."""
+    """A finished unit: where its line stands, what lost it, who made it, its answers and why some are failures.
+
+    `stated` are the columns that its answers' own statements fill.
+    """
 
     offset: int
     length: int
@@ -44,6 +47,7 @@ class Entry:
     by: str
     answers: int
     reasons: tuple[str, ...]
+    stated: Stated
 
 
 class Journal:
@@ -57,6 +61,7 @@ class Journal:
         self.entries: dict[str, Entry] = {}
         self.damage: list[str] = []
         self._stream = stream
+        self._stated: dict[Stated, Stated] = {}
         self._answers = {
             group.key: (len(group.positions), Counter((c.key, name) for c in group.cases for name in c.localizers))
             for group in plan.groups
@@ -135,9 +140,10 @@ class Journal:
 
     def _keep(self, record: Record, offset: int, length: int) -> None:
         reasons = tuple(sys.intern(found.reason) for found in record.findings if found.reason)
-        self.entries[record.unit] = Entry(
-            offset, length, sys.intern(record.error), sys.intern(record.by), len(record.findings), reasons
-        )
+        stated = Stated.among(record.findings)
+        stated = self._stated.setdefault(stated, stated)  # one of each kind is enough
+        error, by, answers = sys.intern(record.error), sys.intern(record.by), len(record.findings)
+        self.entries[record.unit] = Entry(offset, length, error, by, answers, reasons, stated)
 
 
 def encode(record: Record) -> bytes:

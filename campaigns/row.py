@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import math
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Annotated
 
@@ -16,11 +16,12 @@ from conespot.scene import Pose, Scene
 from conespot.scene.model import Model
 
 if TYPE_CHECKING:
-    from conespot.campaigns.plan import Plan
+    pass
 
 Vector = tuple[FiniteFloat, FiniteFloat, FiniteFloat]
-Row = dict[str, str | float]
+Row = dict[str, float]
 _NAN = math.nan
+_NOWHERE = (_NAN, _NAN, _NAN)
 
 
 class Finding(Model):
@@ -69,34 +70,45 @@ def errors(true: Pose, found: Finding | None, rcm: Vector) -> Row:
     rotation about Y and about Z, and `rotation_error_deg` is the root of the sum of the squares of their errors.
     `axis_error_deg` is the angle between the true axis and the one that was found.
     """
-    row: Row = {name: float(v) for name, v in zip(TRUE_TIP, true.apex, strict=True)}
-    apex, axis = (np.array(v or (_NAN,) * 3) for v in ((found.apex, found.axis) if found else (None, None)))
-    offset = apex - true.apex
-    row |= {name: float(v) for name, v in zip(TIP, apex, strict=True)}
-    row |= {name: float(v) for name, v in zip(TIP_ERROR, offset, strict=True)}
-    row["position_error_mm"] = float(np.linalg.norm(offset))
+    (x, y, z), apex, axis = true.apex.tolist(), _NOWHERE, _NOWHERE
+    if found is not None and found.apex is not None and found.axis is not None:
+        apex, axis = found.apex, found.axis
+    offset = apex[0] - x, apex[1] - y, apex[2] - z
     tilt = azimuth = _NAN
-    if found and found.apex and found.apex != tuple(rcm):
+    if apex is not _NOWHERE and apex != tuple(rcm):
         line = Pose.through(apex, rcm)
         tilt = math.degrees(line.tilt - true.tilt)
         azimuth = math.degrees(math.remainder(line.azimuth - true.azimuth, 2.0 * math.pi))
-    row |= {"error_rot_y_deg": tilt, "error_rot_z_deg": azimuth, "rotation_error_deg": math.hypot(tilt, azimuth)}
     # from the chord, which keeps its digits where the cosine loses half of them
-    chord = float(np.linalg.norm(axis - true.axis))
-    row["axis_error_deg"] = math.degrees(2.0 * math.asin(chord / 2.0 if not chord > 2.0 else 1.0))
-    return row
+    u, v, w = true.axis.tolist()
+    chord = _length(axis[0] - u, axis[1] - v, axis[2] - w)
+    return {
+        **dict(zip(TRUE_TIP, (x, y, z), strict=True)),
+        **dict(zip(TIP, apex, strict=True)),
+        **dict(zip(TIP_ERROR, offset, strict=True)),
+        "position_error_mm": _length(*offset),
+        "error_rot_y_deg": tilt,
+        "error_rot_z_deg": azimuth,
+        "rotation_error_deg": math.hypot(tilt, azimuth),
+        "axis_error_deg": math.degrees(2.0 * math.asin(chord / 2.0 if not chord > 2.0 else 1.0)),
+    }
+
+
+def _length(x: float, y: float, z: float) -> float:
+    """Of a vector, in scalars: a campaign has a million rows."""
+    return math.sqrt(x * x + y * y + z * z)
 
 
 @dataclass(frozen=True)
-class _Stated:
+class Stated:
     """Which columns the estimators' own statements need: the same in every row of a run."""
 
-    sigmas: int  #: the largest covariance, 0 if there is none
-    roll: bool
-    bound: bool
+    sigmas: int = 0  #: the largest covariance, 0 if there is none
+    roll: bool = False
+    bound: bool = False
 
     @classmethod
-    def among(cls, findings: Iterable[Finding]) -> _Stated:
+    def among(cls, findings: Iterable[Finding]) -> Stated:
         """The columns that these findings fill."""
         sigmas, roll, bound = 0, False, False
         for found in findings:
@@ -104,11 +116,17 @@ class _Stated:
             roll, bound = roll or found.roll is not None, bound or found.bound is not None
         return cls(sigmas, roll, bound)
 
-    def row(self, true: Pose, found: Finding | None, scene: Scene) -> Row:
+    @classmethod
+    def by(cls, several: Iterable[Stated]) -> Stated:
+        """The columns that any of them fills."""
+        kinds = set(several)
+        return cls(max((k.sigmas for k in kinds), default=0), any(k.roll for k in kinds), any(k.bound for k in kinds))
+
+    def row(self, true: Pose, found: Finding | None, visible: float | None) -> Row:
         """Standard deviations and how well they hold, roll and bound; NaN where there is none.
 
         `est_chi2_tip` is the tip's error in units of its own covariance: chi-squared of three degrees if that is
-        right. `true_in_frame` is the share of the patches' true outline that the frame shows.
+        right. `visible` is the share of the patches' true outline that the frame shows.
         """
         row: Row = {}
         if self.sigmas:
@@ -120,7 +138,7 @@ class _Stated:
                 # a covariance that cannot be inverted is one a stranger's journal holds
                 with contextlib.suppress(np.linalg.LinAlgError):
                     chi2 = float(error @ np.linalg.solve(np.array([line[:3] for line in found.covariance[:3]]), error))
-            row = {"true_in_frame": _in_frame(true, scene)}
+            row = {"true_in_frame": _NAN if visible is None else visible}
             row |= dict(zip(TIP_SIGMA, spread, strict=False))
             row |= {"est_chi2_tip": chi2, "est_sigma_axis_deg": math.degrees(math.hypot(spread[3], spread[4]))}
             row |= {"est_sigma_roll_deg": math.degrees(spread[5])} if self.sigmas > 5 else {}
@@ -132,30 +150,8 @@ class _Stated:
         return row
 
 
-def _in_frame(pose: Pose, scene: Scene) -> float:
+def in_frame(pose: Pose, scene: Scene) -> float:
+    """The share of the patches' outline at a pose that a scene's frame shows."""
     edge = np.concatenate([scene.outline(pose, k, points=64) for k in range(len(scene.spotlights))])
     pixels = scene.camera.project(edge)  # NaN where a ray misses the eye compares as outside
     return float(np.mean(np.all((pixels >= 0.0) & (pixels <= scene.camera.shape[::-1]), axis=-1)))
-
-
-def rows(plan: Plan, records: Mapping[str, Record]) -> Iterator[Row]:
-    """The rows of all finished units in the plan's order: case, localizer, pose. Columns: conespot.results.columns.
-
-    The order and every value depend on the campaign alone, not on who finished a unit when.
-    """
-    stated = _Stated.among(f for record in records.values() for f in record.findings)
-    answers = {key: {(f.case, f.localizer): f for f in record.findings} for key, record in records.items()}
-    homes = {case.key: group for group in plan.groups for case in group.cases}
-    for case in plan.cases:
-        group = homes[case.key]
-        for localizer in case.localizers:
-            for pose in range(len(group.positions)):
-                record = records.get(group.unit(pose))
-                if record is None:
-                    continue
-                found = answers[record.unit].get((case.key, localizer))
-                reason = record.error if found is None else found.reason
-                row: Row = {"case": case.key, "frame": case.frame, **case.labels, "localizer": localizer, "pose": pose}
-                row |= {"status": "failed" if reason else "ok", "reason": reason}
-                row |= errors(group.pose(pose), found, case.scene.instrument.rcm)
-                yield row | stated.row(group.pose(pose), found, case.scene) | case.swept

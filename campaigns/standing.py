@@ -18,6 +18,7 @@ from pydantic import Field, FiniteFloat, TypeAdapter, ValidationError
 from conespot.campaigns.journal import FILE as JOURNAL
 from conespot.campaigns.journal import Entry, whole_lines
 from conespot.campaigns.lock import is_taken
+from conespot.campaigns.row import Stated
 from conespot.scene import InputError
 from conespot.scene.model import Model
 
@@ -136,7 +137,7 @@ def _glance(journal: Path) -> Mapping[str, Entry]:
             except ValidationError:
                 continue
             reasons = tuple(found.reason for found in line.findings if found.reason)
-            entries[line.unit] = Entry(0, 0, line.error, "", len(line.findings), reasons)
+            entries[line.unit] = Entry(0, 0, line.error, "", len(line.findings), reasons, Stated())
     return entries
 
 

@@ -18,7 +18,8 @@ from conespot.campaigns.journal import FILE, Entry, Journal
 from conespot.campaigns.lock import take
 from conespot.campaigns.maker import made_with, maker
 from conespot.campaigns.plan import Plan
-from conespot.campaigns.row import Record, rows
+from conespot.campaigns.row import Record, Stated
+from conespot.campaigns.row_table import row_table
 from conespot.campaigns.schema import resolved
 from conespot.campaigns.standing import FILE as STANDING
 from conespot.campaigns.standing import Count, Standing
@@ -91,19 +92,13 @@ class Store:
         """Write errors.csv and errors.parquet of what is finished, in the plan's order; their number of rows."""
         if not self.entries:
             return 0
-        import pandas as pd
-
-        columns: dict[str, list[str | float]] = {}
-        for row in rows(self.plan, {record.unit: record for record in self._journal.records()}):
-            columns = columns or {name: [] for name in row}
-            for name, value in row.items():
-                columns[name].append(value)
-        frame = pd.DataFrame(columns)
+        stated = Stated.by(entry.stated for entry in self.entries.values())
+        frame = row_table(self.plan, self.entries, self.record, stated)
         text, packed = io.BytesIO(), io.BytesIO()
         frame.to_csv(text, index=False, lineterminator="\n")
         frame.to_parquet(packed, index=False)
-        write_atomically(self.folder / "errors.csv", text.getvalue())
-        write_atomically(self.folder / "errors.parquet", packed.getvalue())
+        write_atomically(self.folder / "errors.csv", text.getbuffer())
+        write_atomically(self.folder / "errors.parquet", packed.getbuffer())
         return len(frame)
 
 

@@ -9,7 +9,7 @@ from pathlib import Path
 from conespot.scene.document import InputError
 
 
-def write_atomically(path: Path, data: bytes) -> None:
+def write_atomically(path: Path, data: bytes | memoryview) -> None:
     """Write `data` to `path`: to a temporary file beside it, onto the disk, then renamed over it.
 
     The folder must exist. Whatever happens, `path` holds its old content or all of the new, and no temporary file

@@ -19,9 +19,10 @@ class Model(BaseModel):
     @classmethod
     def _known_keys(cls, data: Any) -> Any:
         if isinstance(data, dict):
+            known = cls.model_fields  # once: a journal has millions of keys
             for key in data:
-                if key not in cls.model_fields:
-                    raise unknown_key(str(key), list(cls.model_fields))
+                if key not in known:
+                    raise unknown_key(str(key), list(known))
         return data
 
 

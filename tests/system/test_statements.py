@@ -13,7 +13,8 @@ import pytest
 
 from conespot.campaigns.cases import write_cases
 from conespot.campaigns.plan import make_plan
-from conespot.campaigns.row import Finding, Record, rows
+from conespot.campaigns.row import Finding, Record, Stated
+from conespot.campaigns.row_table import row_table
 from conespot.campaigns.schema import makes_frames, override, read_campaign, resolved
 from conespot.results.boxes import box_table
 from conespot.results.columns import COLUMNS, SETTING
@@ -58,7 +59,8 @@ def written(request, tmp_path_factory):
     records = {group.unit(0): answered(group, 0) for group in plan.groups}
     (folder / "campaign.yaml").write_text(dump(resolved(document, {})))
     write_cases(folder, plan)
-    pd.DataFrame(list(rows(plan, records))).to_parquet(folder / "errors.parquet", index=False)
+    stated = Stated.among(f for record in records.values() for f in record.findings)
+    row_table(plan, records, records.__getitem__, stated).to_parquet(folder / "errors.parquet", index=False)
     run = load_run(folder)
     return plan, run, box_table(run.rows)
 
