@@ -17,6 +17,7 @@ from conespot.scene.surface import surface_name
 Label = str | float
 _LONGEST = 120
 
+_RESOLUTION = "scene.camera.resolution"
 #: the standing labels: which key of the campaign each tells, and its short name
 _STANDING: dict[str, tuple[str, Callable[[Campaign], Label]]] = {
     "trajectory": ("trajectory", lambda c: c.trajectory.kind),
@@ -25,7 +26,7 @@ _STANDING: dict[str, tuple[str, Callable[[Campaign], Label]]] = {
     "illumination": ("scene.illumination", lambda c: light_name(c.scene.illumination)),
     "surface": ("scene.surface", lambda c: surface_name(c.scene.surface)),
     "sensor": ("scene.sensor", lambda c: sensor_name(c.scene.sensor)),
-    "resolution_px": ("scene.camera.resolution", lambda c: c.scene.camera.resolution),
+    "resolution_px": (_RESOLUTION, lambda c: c.scene.camera.shape[1]),
 }
 _TOLD = {key for key, _ in _STANDING.values()} | {"localizers"}
 
@@ -39,7 +40,8 @@ def label_columns(cases: Sequence[Combination]) -> dict[str, Sequence[Label]]:
     for name in declared("label"):
         key, short = _STANDING[name]
         names = [short(case.campaign) for case in cases]
-        if any(key in case.chosen for case in cases):
+        # a frame's width stays a number; the size itself gets a column of its own
+        if name != "resolution_px" and any(key in case.chosen for case in cases):
             values = [json.dumps(_without_files(_dumped(case, key)), sort_keys=True) for case in cases]
             if len(set(zip(names, values, strict=True))) > len(set(names)):
                 names = [_written(case, key) for case in cases]
@@ -53,7 +55,8 @@ def swept_columns(cases: Sequence[Combination]) -> dict[str, Sequence[Label]]:
     The values are as the file writes them; numbers if all are, else text.
     """
     columns: dict[str, Sequence[Label]] = {}
-    for key in dict.fromkeys(key for case in cases for key in case.chosen if key not in _TOLD):
+    told = _TOLD if all(len(set(case.campaign.scene.camera.shape)) == 1 for case in cases) else _TOLD - {_RESOLUTION}
+    for key in dict.fromkeys(key for case in cases for key in case.chosen if key not in told):
         values = [_written(case, key) for case in cases]
         numbers = all(isinstance(value, (int, float)) for value in values)
         inner = key.removeprefix("scene.")

@@ -42,8 +42,8 @@ def describe(plan: Plan, workers: int) -> Iterator[str]:
     for case in plan.cases[:_MOST_CASES]:
         labels = {k: v for k, v in case.labels.items() if k not in ("power_w", "resolution_px")} | case.swept
         words = " ".join(f"{v}" if k in case.labels else f"{k}={v}" for k, v in labels.items())
-        side = case.scene.camera.resolution
-        yield f"  {case.key}  {words} {side} px, {_both(case)}, {', '.join(case.localizers)}"
+        px = case.scene.camera.size_words
+        yield f"  {case.key}  {words} {px}, {_both(case)}, {', '.join(case.localizers)}"
     if len(plan.cases) > _MOST_CASES:
         yield f"  ... and {len(plan.cases) - _MOST_CASES} more"
     yield (

@@ -276,11 +276,16 @@ def resolved(document: Document, made_with: dict[str, str]) -> dict[str, Any]:
 
 
 def _located(data: Any, folder: Path) -> Any:
-    """Plain data whose CSV files are named by absolute paths, so that it can be read from another folder."""
+    """Plain data whose CSV and calibration files are named by absolute paths, to be read from another folder."""
     if isinstance(data, list):
         return [_located(item, folder) for item in data]
     if not isinstance(data, dict):
         return data
     if data.get("kind") == "csv" and isinstance(data.get("file"), str):
         data = {k: v for k, v in data.items() if k != "points"} | {"file": str((folder / data["file"]).resolve())}
+    if isinstance(data.get("calibration"), str):
+        data = {**data, "calibration": str((folder / data["calibration"]).resolve())}
+    if isinstance(data.get("scene.camera.calibration"), list):
+        files = [str((folder / str(name)).resolve()) for name in data["scene.camera.calibration"]]
+        data = {**data, "scene.camera.calibration": files}
     return {key: _located(value, folder) for key, value in data.items()}

@@ -10,7 +10,7 @@ if TYPE_CHECKING:
 
 #: options that set a key of the campaign
 _SETTINGS = {
-    "resolution": ("scene.camera.resolution", "PX", "pixels a side of a frame"),
+    "resolution": ("scene.camera.resolution", "PX", "pixels a side of a frame, or 1920x1080"),
     "poses": ("poses", "N", "poses of each trajectory"),
     "samples": ("samples", "N", "rendering samples a pixel"),
     "seed": ("seed", "N", "seed of every random number"),

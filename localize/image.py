@@ -35,7 +35,7 @@ def checked(image: ArrayLike, scene: Scene) -> AnyImage:
     if array.shape[:2] != scene.camera.shape:
         height, width = array.shape[:2]
         raise InputError(
-            f"image: {width} x {height} px do not fit scene.camera.resolution = {scene.camera.resolution} px; "
+            f"image: {width} x {height} px do not fit scene.camera.resolution = {scene.camera.size_words}; "
             "give the whole frame, or the scene of the camera that took it"
         )
     if array.dtype.kind == "f" and not np.isfinite(array).all():
@@ -55,8 +55,8 @@ class Frame:
 
     @property
     def side(self) -> int:
-        """Pixels a side."""
-        return len(self.pixels)
+        """Pixels along the longer side."""
+        return max(self.pixels.shape[:2])
 
     def light(self, rows: slice, columns: slice) -> tuple[Signal, NDArray[np.bool_]]:
         """Signals [white] of some pixels, and which of them are clipped and only bounds: `[h, w, C]` each."""

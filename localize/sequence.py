@@ -76,7 +76,7 @@ class AmbientMap:
         high = np.ceil(points.max(axis=0) + margin).astype(int)
         hidden = (slice(low[1], high[1]), slice(low[0], high[0]))
         light = image.astype(np.float32) - np.float32(self._black)
-        stride = max(1, len(image) // 500)
+        stride = max(1, max(image.shape[:2]) // 500)
         coarse = np.ones(image.shape[:2], bool)
         coarse[hidden] = False
         level = float(np.median(light[::stride, ::stride][coarse[::stride, ::stride]]))

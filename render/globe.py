@@ -49,15 +49,17 @@ def _pupil_to_world(mi: ModuleType, eye: Eye, globe: Globe) -> ScalarTransform4f
 
 
 def near_plane(scene: Scene) -> float:
-    """Distance from the camera [mm] behind which it sees: inside the eye, so that the wall above does not hide it."""
+    """Depth along the camera's axis [mm] behind which it sees: inside the eye, so that the wall does not hide it."""
     eye, camera = scene.eye, scene.camera
     height, width = camera.shape
     corners = camera.rays([(x, y) for x in (0, width) for y in (0, height)])
-    down = (eye.radius - corners.origins[..., 2]) / corners.directions[..., 2]
-    across = (corners.origins + down[:, None] * corners.directions)[:, :2]
-    reach = float(np.max(np.linalg.norm(across, axis=-1)))  # of what it sees at the height of the eye's centre
+    ahead = -camera.axes[2]
+    middle = float((eye.centre - camera.centre) @ ahead)
+    along = middle / (corners.directions @ ahead)
+    off = corners.origins + along[:, None] * corners.directions - eye.centre
+    reach = float(np.max(np.linalg.norm(off, axis=-1)))  # of what it sees as deep as the eye's centre is
     top = eye.radius + math.sqrt(max(eye.radius**2 - reach**2, 0.0))
-    return float(camera.height - 0.95 * top)
+    return middle + eye.radius - 0.95 * top
 
 
 def _wall(scene: Scene) -> dict[str, object]:

@@ -2,14 +2,21 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import TYPE_CHECKING
+
+import numpy as np
 
 from conespot.render import kernel
 from conespot.scene import Camera
+from conespot.scene.distortion import Distortion
 
 if TYPE_CHECKING:
     from drjit.auto.ad import Float
     from mitsuba import RayDifferential3f, Spectrum
+
+#: Newton's steps against distortion end where they are this close to the inverse [px]
+_CLOSE = 1e-3
 
 
 class RayGenerator:
@@ -19,24 +26,61 @@ class RayGenerator:
     """
 
     def __init__(self, camera: Camera, near: float) -> None:
-        """Rays begin where they are `near` [mm] below the pinhole, so that nothing above hides the retina."""
-        mi, dr, _ = kernel.load()
-        rows, columns = camera.shape
-
-        def held(value: float) -> Float:
-            # a literal would be a constant of the kernel, which were compiled anew for every camera
-            return dr.opaque(mi.Float, value)
-
-        self._middle = held(columns / 2.0), held(rows / 2.0)
-        self._pixel = held(1.0 / camera.focal_length_px)  # at a distance of 1
-        self._origin = [held(part) for part in camera.centre.tolist()]
-        self._near = held(near)
+        """Rays begin at a depth of `near` [mm] along the camera's axis, so that nothing above hides the retina."""
+        mi, _, _ = kernel.load()
+        focal_length = camera.focal_length_px
+        self._middle = _held(camera.principal.tolist())
+        self._pixel = _held([1.0 / focal_length, 1.0 / (focal_length * camera.pixel_aspect)])  # at a distance of 1
+        self._lens = None if camera.distortion is None else _Lens(camera, camera.distortion)
+        self._origin = mi.Point3f(*_held(camera.centre.tolist()))
+        upright = camera.tilt == camera.roll == 0.0
+        self._axes = None if upright else [mi.Vector3f(*_held(axis)) for axis in camera.axes.tolist()]
+        self._near = _held([near])[0]
 
     def rays(self, x: Float, y: Float, wavelengths: Spectrum) -> RayDifferential3f:
         """The rays of film positions (x, y) [px], x to the right and y down, with their wavelengths [nm]."""
         mi, dr, _ = kernel.load()
-        across, down = (x - self._middle[0]) * self._pixel, (y - self._middle[1]) * self._pixel
-        per_depth = dr.sqrt(dr.fma(across, across, dr.fma(down, down, 1.0)))  # length of a ray a mm down
-        direction = mi.Vector3f(across, -down, -1.0) / per_depth
-        origin = mi.Point3f(*self._origin) + direction * (self._near * per_depth)
+        across, down = (x - self._middle[0]) * self._pixel[0], (y - self._middle[1]) * self._pixel[1]
+        if self._lens is not None:
+            across, down = self._lens.undistorted(across, down)
+        per_depth = dr.sqrt(dr.fma(across, across, dr.fma(down, down, 1.0)))  # length of a ray a mm down the axis
+        if self._axes is None:
+            direction = mi.Vector3f(across, -down, -1.0) / per_depth
+        else:
+            right, up, back = self._axes
+            direction = (right * across - up * down - back) / per_depth
+        origin = self._origin + direction * (self._near * per_depth)
         return mi.RayDifferential3f(origin, direction, wavelengths=wavelengths)
+
+
+class _Lens:
+    """`Distortion.undistorted` in Dr.Jit."""
+
+    def __init__(self, camera: Camera, lens: Distortion) -> None:
+        self._coefficients = _held(lens.coefficients)
+        rows, columns = camera.shape
+        x, y = np.meshgrid(np.linspace(0.0, columns, 33), np.linspace(0.0, rows, 33))
+        self._steps = lens.steps(*camera.on_plane(np.stack([x, y], axis=-1)), _CLOSE / camera.focal_length_px)
+
+    def undistorted(self, to_x: Float, to_y: Float) -> tuple[Float, Float]:
+        k1, k2, p1, p2, k3 = self._coefficients
+        x, y = to_x, to_y
+        for _ in range(self._steps):
+            r2 = x * x + y * y
+            radial = r2 * (k1 + r2 * (k2 + r2 * k3))
+            twice = 2.0 * (k1 + r2 * (2.0 * k2 + r2 * 3.0 * k3))
+            # differences from (x, y) first, which are small
+            off_x = (to_x - x) - (x * radial + 2.0 * p1 * x * y + p2 * (r2 + 2.0 * x * x))
+            off_y = (to_y - y) - (y * radial + p1 * (r2 + 2.0 * y * y) + 2.0 * p2 * x * y)
+            xx = 1.0 + radial + twice * x * x + 2.0 * p1 * y + 6.0 * p2 * x
+            xy = twice * x * y + 2.0 * p1 * x + 2.0 * p2 * y
+            yy = 1.0 + radial + twice * y * y + 6.0 * p1 * y + 2.0 * p2 * x
+            per = 1.0 / (xx * yy - xy * xy)
+            x, y = x + per * (yy * off_x - xy * off_y), y + per * (xx * off_y - xy * off_x)
+        return x, y
+
+
+def _held(values: Sequence[float]) -> list[Float]:
+    """Numbers as data of a kernel: literals would be its constants, and every camera had a kernel of its own."""
+    mi, dr, _ = kernel.load()
+    return [dr.opaque(mi.Float, value) for value in values]

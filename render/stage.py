@@ -53,6 +53,11 @@ class Stage:
         mi, _, chosen = kernel.load()
         self._mi, self._vectorized = mi, chosen.vectorized
         self._columns = scene.camera.shape[1]
+        if not (chosen.vectorized or scene.camera.is_plain):
+            raise kernel.KernelError(
+                "a camera that is aslant, distorts, or has a principal point or oblong pixels needs a JIT variant of"
+                " Mitsuba, and the scalar one is in use; `campaign doctor` says why"
+            )
         self._reflectance = Reflectance(scene.retina)
         channels = spectral.channels(scene, light, responses)
         self.channels = len(channels)

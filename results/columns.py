@@ -62,7 +62,7 @@ COLUMNS = (
     Column("illumination", "label", "text", "the spotlights' light"),
     Column("surface", "label", "text", "the retina's shape"),
     Column("sensor", "label", "text", "what takes the image"),
-    Column("resolution_px", "label", "whole", "pixels along a side of the image", "px", 1, 2**31 - 1),
+    Column("resolution_px", "label", "whole", "pixels along a row of the image", "px", 1, 2**31 - 1),
     Column("localizer", "localizer", "text", "what localized the frame"),
     Column("pose", "pose", "whole", "number of the pose along the trajectory", "", 0, 2**31 - 1),
     Column("status", "outcome", "text", "ok or failed"),

@@ -1,19 +1,48 @@
-"""The camera: a pinhole above the eye that looks straight down."""
+"""The camera: a pinhole above the eye, straight or aslant, whose lens may distort."""
 
 from __future__ import annotations
 
 import math
+import re
 from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated, Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from pydantic import Field
+from pydantic import BeforeValidator, Field, ValidationInfo, model_validator
 
+from conespot.scene.calibration_file import intrinsics
+from conespot.scene.distortion import Distortion
 from conespot.scene.model import Model
-from conespot.scene.quantity import Length
+from conespot.scene.quantity import Angle, Length, parse_quantity
 
 Array = NDArray[np.float64]
 _STILL = np.zeros(3)
+_FEWEST, _MOST = 16, 20000
+#: a lens that folds the image this close to the frame's corners, relative to their distance from the principal point,
+#: is refused: what lies just outside the frame must not come back into it
+_MARGIN = 1.05
+
+
+def _resolution(value: object) -> object:
+    """A pair for [width, height] and "1920x1080"; a square's side alone, so that it has one address."""
+    if isinstance(value, str) and (match := re.fullmatch(r"\s*(\d+)\s*[xX×]\s*(\d+)\s*", value)):
+        value = [int(match[1]), int(match[2])]
+    if not isinstance(value, (list, tuple)):
+        return value
+    whole = len(value) == 2 and all(type(side) is int and _FEWEST <= side <= _MOST for side in value)
+    if not whole:
+        raise ValueError(f"give pixels a side, or [width, height], from {_FEWEST} to {_MOST}, got {list(value)!r}")
+    return value[0] if value[0] == value[1] else tuple(value)
+
+
+def _pixels(value: object) -> float:
+    return parse_quantity(value, "pixels")
+
+
+_Side = Annotated[int, Field(ge=_FEWEST, le=_MOST)]
+_Pixels = Annotated[float, BeforeValidator(_pixels)]
 
 
 @dataclass(frozen=True, eq=False)
@@ -32,13 +61,17 @@ class Rays:
 
 
 class Camera(Model):
-    """Pinhole at (0, 0, height), looking along -z, +x right and +y up in the image (paper, Table II).
+    """Pinhole at (0, 0, height), looking along -z, +x right and +y up in the image (paper, Table II), or moved.
 
     Pixel coordinates run x to the right and y down; the centre of the first pixel is at (0.5, 0.5).
 
+    It stands `height` from the point that it looks at, `tilt` off the vertical towards `azimuth` (from +x to +y), and
+    is turned by `roll` about its axis, its right side down. `calibration` names a file of OpenCV's with resolution,
+    focal length, pixel aspect, principal point and distortion, which are then not given beside it.
+
     Renderer, forward model, crops and occlusion know a camera by its `shape`, `rays` and `project`; the fits take
-    `pixel_pitch` as their scale, and the published method has the paper's own pinhole. Another kind of camera is
-    another class with these, and a sensor of Mitsuba's in `render.stage`.
+    `pixel_pitch` as their scale, and the published method has the paper's own pinhole. In Dr.Jit the same rays are
+    `render.rays.RayGenerator`'s.
 
     >>> camera = Camera(resolution=1000)
     >>> camera.project([0.0, 0.0, 0.0]).tolist()
@@ -47,33 +80,101 @@ class Camera(Model):
     [0.0, 0.0, -1.0]
     """
 
-    resolution: int = Field(5000, ge=16, le=20000)  #: pixels a side [px]
+    #: pixels a side, or width and height [px]
+    resolution: Annotated[_Side | tuple[_Side, _Side], BeforeValidator(_resolution)] = 5000
     sensor_width: Length = Field(36.0, gt=0.0)
     focal_length: Length = Field(300.0, gt=0.0)
-    height: Length = Field(110.0, gt=0.0)  #: pinhole above the posterior pole, the paper's d0 [mm]
+    height: Length = Field(110.0, gt=0.0)  #: pinhole above the posterior pole (from `look_at`), the paper's d0 [mm]
+    pixel_aspect: float = Field(1.0, ge=0.1, le=10.0)  #: width of a pixel over its height
+    principal_point: tuple[_Pixels, _Pixels] | None = None  #: (x, y) [px]; the frame's centre if not given
+    distortion: Distortion | None = None
+    tilt: Angle = Field(0.0, ge=0.0, le=math.pi / 3.0)
+    azimuth: Angle = 0.0
+    roll: Angle = 0.0
+    look_at: tuple[Length, Length, Length] = (0.0, 0.0, 0.0)  #: where the axis goes through [mm]
+
+    @model_validator(mode="before")
+    @classmethod
+    def _calibrated(cls, data: Any, info: ValidationInfo) -> Any:
+        if not (isinstance(data, dict) and "calibration" in data):
+            return data
+        path = Path(info.context["folder"] if info.context else ".") / str(data["calibration"])
+        found = intrinsics(path, parse_quantity(data.get("sensor_width", 36.0), "length"))
+        given = [key for key in found if key in data]
+        if given:
+            raise ValueError(f"{', '.join(given)} would also come from calibration; give only one of the two")
+        return {**{key: value for key, value in data.items() if key != "calibration"}, **found}
+
+    @model_validator(mode="after")
+    def _one_to_one(self) -> Camera:
+        if self.distortion is None:
+            return self
+        rows, columns = self.shape
+        along = np.linspace(0.0, 1.0, 17)
+        border = np.concatenate([[(t, 0.0), (t, 1.0), (0.0, t), (1.0, t)] for t in along]) * [columns, rows]
+        x, y = self.on_plane(self.principal + _MARGIN * (border - self.principal))
+        if not np.all(np.isfinite(self.distortion.undistorted(x, y))):
+            raise ValueError(
+                "distortion: these coefficients fold the image within the frame or at its rim"
+                f" ({', '.join(f'{c:g}' for c in self.distortion.coefficients)} as k1, k2, p1, p2, k3);"
+                " check their order and the focal length"
+            )
+        return self
 
     @property
     def shape(self) -> tuple[int, int]:
         """Rows and columns of a frame [px]."""
-        return self.resolution, self.resolution
+        if isinstance(self.resolution, int):
+            return self.resolution, self.resolution
+        return self.resolution[1], self.resolution[0]
+
+    @property
+    def size_words(self) -> str:
+        """The frame's size in words: 5000 px a side, or 1920 x 1080 px."""
+        return f"{self.resolution} px" if isinstance(self.resolution, int) else "{} x {} px".format(*self.resolution)
+
+    @property
+    def is_plain(self) -> bool:
+        """Whether it is the paper's: straight above the pole, square pixels, no distortion, its axis in the middle."""
+        moved = self.tilt != 0.0 or self.roll != 0.0 or self.look_at != (0.0, 0.0, 0.0)
+        return not moved and self.pixel_aspect == 1.0 and self.principal_point is None and self.distortion is None
 
     @property
     def centre(self) -> Array:
         """The pinhole `[3]` [mm]."""
-        return np.array([0.0, 0.0, self.height])
+        return np.asarray(self.look_at) + self.height * self.axes[2]
+
+    @property
+    def axes(self) -> Array:
+        """Unit vectors `[3, 3]`, one a row: to the right in the image, up in the image, and back along the axis."""
+        turn = _about_z(self.azimuth)
+        lean = np.array(
+            [
+                [math.cos(self.tilt), 0.0, math.sin(self.tilt)],
+                [0.0, 1.0, 0.0],
+                [-math.sin(self.tilt), 0.0, math.cos(self.tilt)],
+            ]
+        )
+        return np.asarray((turn @ lean @ turn.T @ _about_z(-self.roll)).T)
+
+    @property
+    def principal(self) -> Array:
+        """Where the axis goes through the image `[2]` [px]."""
+        rows, columns = self.shape
+        return np.array(self.principal_point or (columns / 2.0, rows / 2.0))
 
     @property
     def focal_length_px(self) -> float:
-        """Focal length in pixels.
+        """Focal length in pixels, counted along a row.
 
         >>> round(Camera().focal_length_px, 1)
         41666.7
         """
-        return self.resolution * self.focal_length / self.sensor_width
+        return self.shape[1] * self.focal_length / self.sensor_width
 
     @property
     def full_fov(self) -> float:
-        """Full angle of view across the image [rad].
+        """Full angle of view across the image's width, without distortion and its axis in the middle [rad].
 
         >>> round(math.degrees(Camera().full_fov), 4)  # Table II
         6.8673
@@ -82,28 +183,49 @@ class Camera(Model):
 
     @property
     def pixel_pitch(self) -> float:
-        """Side of a pixel at the posterior pole [mm].
+        """Width of a pixel at the posterior pole (at `look_at`) [mm].
 
         >>> round(Camera().pixel_pitch, 5)
         0.00264
         """
         return self.height / self.focal_length_px
 
+    def with_columns(self, columns: int) -> Camera:
+        """The same view with that many pixels along a row, and as many rows as keep its shape [px]."""
+        scale = columns / self.shape[1]
+        update: dict[str, Any] = {"resolution": columns}
+        if not isinstance(self.resolution, int):
+            update["resolution"] = (columns, round(scale * self.resolution[1]))
+        if self.principal_point is not None:
+            update["principal_point"] = tuple(scale * c for c in self.principal_point)
+        return self.model_copy(update=update)
+
     def rays(self, pixels: ArrayLike) -> Rays:
-        """The rays of pixel coordinates `[..., 2]` [px], in the frame or beyond."""
+        """The rays of pixel coordinates `[..., 2]` [px], in the frame or beyond; NaN where the lens puts nothing."""
         q = np.asarray(pixels, float)
-        half, f = self.resolution / 2.0, self.focal_length_px
+        x, y = self.on_plane(q)
+        lens: tuple[float | Array, float | Array, float | Array] = (
+            1.0,
+            0.0,
+            1.0,
+        )  # how the undistorted plane changes with the distorted one: xx, xy, yy
+        if self.distortion is not None:
+            x, y = self.distortion.undistorted(x, y)
+            xx, xy, yy = self.distortion.jacobian(x, y)
+            per = 1.0 / (xx * yy - xy * xy)
+            lens = per * yy, -per * xy, per * xx
         d = np.empty((3, *q.shape[:-1]))  # components first: three times as fast as last
-        d[0], d[1], d[2] = (q[..., 0] - half) / f, (half - q[..., 1]) / f, -1.0
+        d[0], d[1], d[2] = x, 0.0 - y, -1.0  # no negative zero
         length = np.sqrt(d[0] * d[0] + d[1] * d[1] + 1.0)
         d /= length
-        # of D / |D| with D' = (1, 0, 0) / f, and (0, -1, 0) / f down the image
-        per_pixel = 1.0 / (f * length)
-        by_x, by_y = -(per_pixel * d[0]) * d, (per_pixel * d[1]) * d
-        by_x[0] += per_pixel
-        by_y[1] -= per_pixel
+        f = self.focal_length_px
+        by_x = _across(d, 1.0 / (f * length), lens[0], -lens[1])
+        by_y = _across(d, 1.0 / (f * self.pixel_aspect * length), lens[1], -lens[2])
         last = (*range(1, d.ndim), 0)
-        return Rays(self.centre, d.transpose(last), _STILL, _STILL, by_x.transpose(last), by_y.transpose(last))
+        seen = [part.transpose(last) for part in (d, by_x, by_y)]
+        if self.tilt or self.roll:
+            seen = [part @ self.axes for part in seen]
+        return Rays(self.centre, seen[0], _STILL, _STILL, seen[1], seen[2])
 
     def project(self, points: ArrayLike) -> Array:
         """Pixel coordinates `[..., 2]` [px] of points `[..., 3]` [mm], the inverse of `rays`.
@@ -114,7 +236,33 @@ class Camera(Model):
         [nan, nan]
         """
         p = np.asarray(points, float)
-        below = self.height - p[..., 2]
-        scale = self.focal_length_px / np.where(below > 0.0, below, np.nan)
-        half = self.resolution / 2.0
-        return np.stack([half + scale * p[..., 0], half - scale * p[..., 1]], axis=-1)
+        if self.tilt or self.roll or self.look_at != (0.0, 0.0, 0.0):
+            p = (p - self.centre) @ self.axes.T
+            below = -p[..., 2]
+        else:
+            below = self.height - p[..., 2]
+        below = np.where(below > 0.0, below, np.nan)
+        (cx, cy), f = self.principal, self.focal_length_px
+        if self.distortion is not None:
+            x, y = self.distortion.distorted(p[..., 0] / below, -p[..., 1] / below)
+            return np.stack([cx + f * x, cy + f * self.pixel_aspect * y], axis=-1)
+        scale = f / below
+        return np.stack([cx + scale * p[..., 0], cy - scale * self.pixel_aspect * p[..., 1]], axis=-1)
+
+    def on_plane(self, pixels: Array) -> tuple[Array, Array]:
+        """Pixel coordinates `[..., 2]` [px] as (x, y), y down, on the plane at distance 1, where the lens put them."""
+        (cx, cy), f = self.principal, self.focal_length_px
+        return (pixels[..., 0] - cx) / f, (pixels[..., 1] - cy) / (f * self.pixel_aspect)
+
+
+def _about_z(angle: float) -> Array:
+    c, s = math.cos(angle), math.sin(angle)
+    return np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
+
+
+def _across(d: Array, per: Array, x: float | Array, y: float | Array) -> Array:
+    """How the unit directions `[3, ...]` change where the ray's end moves by (x, y, 0) for each `per` of its length."""
+    moved = -(per * (x * d[0] + y * d[1])) * d
+    moved[0] += per * x
+    moved[1] += per * y
+    return moved

@@ -31,6 +31,8 @@ _MAX_NODES = 12_000
 _MAX_DEPTH = 32
 _MAX_BITS = 1024
 _LONGEST = 1000
+#: keys of a camera that its calibration file stands for
+CALIBRATED = ("resolution", "focal_length", "pixel_aspect", "principal_point", "distortion")
 _PLAIN_TAGS = {f"tag:yaml.org,2002:{name}" for name in ("str", "int", "float", "bool", "null")}
 
 
@@ -213,10 +215,11 @@ def _untagged(node: Node, where: str) -> Any:
 def merge(base: dict[str, Any], over: dict[str, Any], model: type[BaseModel] | None = None) -> dict[str, Any]:
     """`base` with `over` laid on it: mappings are merged key by key, everything else is replaced.
 
-    A mapping that names another `kind` replaces as a whole, since its other keys mean nothing to the new kind. Where
-    the data are a `model`'s, a word of `base` (`sensor: linear`) is the mapping that it stands for.
+    A mapping that names another `kind` replaces as a whole, since its other keys mean nothing to the new kind; one that
+    names a `calibration` file replaces what such a file holds. Where the data are a `model`'s, a word of `base`
+    (`sensor: linear`) is the mapping that it stands for.
     """
-    result = dict(base)
+    result = {key: value for key, value in base.items() if "calibration" not in over or key not in CALIBRATED}
     for key, value in over.items():
         old = result.get(key)
         if model is not None and isinstance(old, str) and isinstance(value, dict):

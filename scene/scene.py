@@ -45,8 +45,10 @@ class Scene(Model):
     @model_validator(mode="after")
     def _fits(self) -> Scene:
         surface, radius = self.surface, self.eye.radius
-        if self.camera.height <= 2.0 * radius * max(1.0, surface.semi_axes[2]):
+        if self.camera.centre[2] <= 2.0 * radius * max(1.0, surface.semi_axes[2]):
             raise ValueError("camera.height must put the camera above the eye (more than twice eye.radius)")
+        if not self.camera.is_plain and not self._is_seen():
+            raise ValueError("camera: no ray of it meets the retina; check look_at, tilt and principal_point")
         for bump in surface.bumps:
             if np.hypot(bump.x, bump.y) >= radius:
                 raise ValueError(f"the bump at ({bump.x:g}, {bump.y:g}) mm lies outside the eye")
@@ -57,6 +59,13 @@ class Scene(Model):
         if self.interreflection is not None and surface != Surface(bumps=surface.bumps):
             raise ValueError("interreflection is worked out in a sphere: leave semi_axes and height_map out of surface")
         return self
+
+    def _is_seen(self) -> bool:
+        """Whether some of the camera's rays meet the eye."""
+        rows, columns = self.camera.shape
+        x, y = np.meshgrid(np.linspace(0.0, columns, 17), np.linspace(0.0, rows, 17))
+        rays = self.camera.rays(np.stack([x, y], axis=-1))
+        return bool(np.any(np.isfinite(self.eye.intersect(rays.origins, rays.directions))))
 
     def pose(self, apex: NDArray[np.float64]) -> Pose:
         """The pose of the tip at `apex` `[3]` [mm]. Raises ValueError if it is outside the eye or in its wall."""

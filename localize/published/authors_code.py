@@ -16,19 +16,18 @@ import numpy as np
 
 from conespot.localize.outcome import NO_ELLIPSE, NO_INTERSECTION, LocalizationFailure
 from conespot.localize.published.cone_geometry import Array, Candidates, Plane, cone_over_ellipse, retina_points
-from conespot.localize.published.detection import Contour
 from conespot.localize.published.ellipse import fit_ellipse
 from conespot.scene import Scene
 
 
-def coded_candidates(outline: Contour, scene: Scene, *, whole_pixels: bool) -> Candidates | LocalizationFailure:
+def coded_candidates(outline: Array, scene: Scene, *, whole_pixels: bool) -> Candidates | LocalizationFailure:
     """Candidates for an outline `[N, 2]` of pixel indices; `whole_pixels` cuts to integers as the authors' code does.
 
     Works as the code does in units of one pixel at the posterior pole: x and y as pixel indices, y down, z up.
     """
     camera, eye = scene.camera, scene.eye
     pitch = camera.pixel_pitch
-    middle = (camera.resolution - 1) / 2.0
+    middle = (camera.shape[1] - 1) / 2.0
     cut = np.trunc if whole_pixels else np.asarray
 
     wall = retina_points(camera, eye, outline + 0.5)

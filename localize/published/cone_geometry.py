@@ -17,6 +17,8 @@ Array = NDArray[np.float64]
 def retina_points(camera: Camera, eye: Eye, pixels: ArrayLike) -> Array:
     """Points `[..., 3]` [mm] of the retina seen at pixel coordinates `[..., 2]` [px]; NaN where a ray misses the eye.
 
+    The camera must be the paper's own, square and straight above the pole.
+
     Paper, Eqs. 1-7. With y1 the distance of the sensor point from the sensor's centre and m = y1 / f, Eq. 3 (its
     first term under the root corrected to (2 d0 f/y1 - 2 r f/y1)^2) is, times m, the distance from the optical axis
 
@@ -26,7 +28,7 @@ def retina_points(camera: Camera, eye: Eye, pixels: ArrayLike) -> Array:
     a sensor point with x_c = 0 is no special case.
     """
     d0, r = camera.height, eye.radius
-    half = camera.resolution / 2.0
+    half = camera.shape[1] / 2.0
     sensor = (np.asarray(pixels, float) - half) * [1.0, -1.0] / camera.focal_length_px  # (x_c, y_c) / f, y up
     m2 = np.sum(sensor * sensor, axis=-1)
     root2 = (d0 - r) ** 2 - (1.0 + m2) * (d0 * d0 - 2.0 * d0 * r)

@@ -26,7 +26,7 @@ class Mask:
     bright: NDArray[np.uint8]
     left: int  #: column of the frame where `bright` begins
     top: int  #: row
-    side: int  #: rows of the frame
+    frame: tuple[int, int]  #: rows and columns of the frame
 
     @classmethod
     def above(cls, grey: Grey, level: int, highest: Grey | None = None) -> Mask:
@@ -34,7 +34,7 @@ class Mask:
         rows = _span((grey.max(axis=1) if highest is None else highest) > level)
         columns = _span(grey[rows].max(axis=0) > level)
         bright = cv2.threshold(grey[rows, columns], level, 1, cv2.THRESH_BINARY)[1]
-        return cls(np.asarray(bright, np.uint8), columns.start, rows.start, len(grey))
+        return cls(np.asarray(bright, np.uint8), columns.start, rows.start, (grey.shape[0], grey.shape[1]))
 
 
 def otsu_mask(grey: Grey) -> Mask:
@@ -98,7 +98,8 @@ def outlines(mask: Mask, count: int) -> list[Contour] | LocalizationFailure:
     largest = [c for area, c in blobs[:count] if area > 0.0 and area >= PUBLISHED.smallest_share * blobs[0][0]]
     if not largest:
         return LocalizationFailure(NOTHING_FOUND)
-    if any(c.min() == 0 or c.max() == mask.side - 1 for c in largest):
+    last = np.array(mask.frame[::-1]) - 1
+    if any(c.min() == 0 or np.any(c == last) for c in largest):
         return LocalizationFailure(CUT_BY_BORDER)
     if len(largest) < count:
         return LocalizationFailure(FEWER_PATCHES)

@@ -24,6 +24,7 @@ from conespot.localize.published.authors_code import coded_candidates
 from conespot.localize.published.cone_geometry import Array, Candidates, cone_over_ellipse, fitted_plane, retina_points
 from conespot.localize.published.detection import Contour, Grey, Mask, coded_mask, otsu_mask, outlines
 from conespot.localize.published.ellipse import fit_ellipse
+from conespot.localize.published.ideal_pinhole import as_the_paper_sees
 from conespot.localize.published.settings import PUBLISHED
 from conespot.scene import Pose, Scene
 from conespot.scene.pose import rot_x, rot_y
@@ -46,14 +47,15 @@ class Method:
     """A published method: how it parts light from dark, an outline to candidates, and of several positions one."""
 
     segment: Callable[[Grey], Mask]
-    reconstruct: Callable[[Contour, Scene], Candidates | LocalizationFailure]
+    reconstruct: Callable[[Array, Scene], Candidates | LocalizationFailure]
     unite: Callable[..., Array]
 
     def localize(self, image: AnyImage, scene: Scene, truth: Pose | None = None) -> Outcome:
         """The answer; with a `truth` the candidates nearest to it are taken."""
-        patches = outlines(self.segment(grey8(image, scene)), len(scene.spotlights))
-        if isinstance(patches, LocalizationFailure):
-            return patches
+        found = outlines(self.segment(grey8(image, scene)), len(scene.spotlights))
+        if isinstance(found, LocalizationFailure):
+            return found
+        patches, scene = as_the_paper_sees(found, scene)
         pairs: list[Candidates] = []
         for patch in patches:
             pair = self.reconstruct(patch, scene)
@@ -76,11 +78,12 @@ class Method:
     def steps(self, image: AnyImage, scene: Scene) -> Steps:
         """What `localize` sees on its way, once more, to be looked at."""
         mask = self.segment(grey8(image, scene))
-        patches = outlines(mask, len(scene.spotlights))
-        if isinstance(patches, LocalizationFailure):
+        found = outlines(mask, len(scene.spotlights))
+        if isinstance(found, LocalizationFailure):
             return Steps(mask, (), ())
+        patches, scene = as_the_paper_sees(found, scene)
         pairs = [self.reconstruct(patch, scene) for patch in patches]
-        return Steps(mask, tuple(patches), tuple(pair for pair in pairs if isinstance(pair, Candidates)))
+        return Steps(mask, tuple(found), tuple(pair for pair in pairs if isinstance(pair, Candidates)))
 
 
 def paper(image: AnyImage, scene: Scene) -> Outcome:
@@ -110,7 +113,7 @@ def paper_code_oracle(image: AnyImage, scene: Scene, truth: Pose) -> Outcome:
     return METHODS["paper-code-oracle"].localize(image, scene, truth)
 
 
-def text_candidates(outline: Contour, scene: Scene) -> Candidates | LocalizationFailure:
+def text_candidates(outline: Array, scene: Scene) -> Candidates | LocalizationFailure:
     """Candidates for an outline `[N, 2]` of pixel indices, with the ellipse in the outline's own plane."""
     points = retina_points(scene.camera, scene.eye, outline + 0.5)
     if np.isnan(points).any():
@@ -123,11 +126,11 @@ def text_candidates(outline: Contour, scene: Scene) -> Candidates | Localization
     return Candidates.of(plane.world(apexes), plane.world(vertices), ellipse.a - ellipse.b)
 
 
-def _integer_candidates(outline: Contour, scene: Scene) -> Candidates | LocalizationFailure:
+def _integer_candidates(outline: Array, scene: Scene) -> Candidates | LocalizationFailure:
     return coded_candidates(outline, scene, whole_pixels=True)
 
 
-def _float_candidates(outline: Contour, scene: Scene) -> Candidates | LocalizationFailure:
+def _float_candidates(outline: Array, scene: Scene) -> Candidates | LocalizationFailure:
     return coded_candidates(outline, scene, whole_pixels=False)
 
 

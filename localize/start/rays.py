@@ -83,7 +83,7 @@ def _across(
     curve = curves[spotlight]
     along = START.along
     needed = len(along) - START.samples_missed
-    last = overview.light.shape[0] - 1.0
+    last = np.array(overview.light.shape[::-1]) - 1.0
     bins = curve / overview.step - 0.5
     middle = bins.mean(axis=0)
     at = middle + along[None, :, None] * (bins - middle)[:, None, :]
@@ -143,9 +143,9 @@ def _within(at: Array, curve: Array, profile: Array) -> Array:
 
 def _sampled(plane: Signal, at: Array, blur: float) -> Signal:
     """The blurred plane at points `[..., 2]` in its pixels' indices."""
-    side = plane.shape[0]
-    low = np.clip(np.floor(at.min(axis=(0, 1))).astype(int) - 3, 0, side - 2)
-    high = np.clip(np.ceil(at.max(axis=(0, 1))).astype(int) + 4, 2, side)
+    sides = np.array(plane.shape[::-1])
+    low = np.clip(np.floor(at.min(axis=(0, 1))).astype(int) - 3, 0, sides - 2)
+    high = np.clip(np.ceil(at.max(axis=(0, 1))).astype(int) + 4, 2, sides)
     crop = cv2.GaussianBlur(plane[low[1] : high[1], low[0] : high[0]], (0, 0), blur)
     x, y = (np.ascontiguousarray(at[..., k] - low[k], np.float32) for k in (0, 1))
     return np.asarray(cv2.remap(crop, x, y, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE), np.float32)

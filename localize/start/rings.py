@@ -76,9 +76,11 @@ def find_rings(
     `small` rings need finer bins, which take longer.
     """
     side = START.fine_bin_side if small else START.bin_side
-    n = overview.light.shape[0] // side
+    rows, columns = (n // side for n in overview.light.shape)
     planes = [
-        None if plane is None else np.asarray(cv2.resize(plane, (n, n), interpolation=cv2.INTER_AREA), np.float32)
+        None
+        if plane is None
+        else np.asarray(cv2.resize(plane, (columns, rows), interpolation=cv2.INTER_AREA), np.float32)
         for plane in (overview.light, overview.reference)
     ]
     assert planes[0] is not None
@@ -93,11 +95,11 @@ def find_rings(
     low, high = max(START.smallest, START.nearest * reach), max(2.0 * START.smallest, reach * scene.eye.radius)
     high = max(2.0 * low, START.fine_reach) if small else high
     radii = tuple(np.geomspace(low, high, max(3, round(math.log(high / low, START.radius_ratio)) + 1)).tolist())
-    size = int(fft.next_fast_len(n + math.ceil(high) + 2, real=True))
+    size = int(fft.next_fast_len(max(rows, columns) + math.ceil(high) + 2, real=True))
     field = fft.rfft2(np.stack([gx * vote, gy * vote]), s=(size, size))
     kernels = ring_kernels(size, radii)
-    votes = fft.irfft2(field[0] * kernels[:, 0] + field[1] * kernels[:, 1], s=(size, size))[:, :n, :n]
-    y, x = np.ogrid[:n, :n]
+    votes = fft.irfft2(field[0] * kernels[:, 0] + field[1] * kernels[:, 1], s=(size, size))[:, :rows, :columns]
+    y, x = np.ogrid[:rows, :columns]
     found = []
     for _ in range(most):
         k, row, column = np.unravel_index(int(np.argmax(votes)), votes.shape)

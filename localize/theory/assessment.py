@@ -81,7 +81,7 @@ def tied(free: Bound, scene: Scene, pose: Pose, rcm_sigma_mm: float | None) -> B
 
 
 def _at(scene: Scene, *, resolution: int | None = None, softness: float | None = None) -> Scene:
-    camera = scene.camera.model_copy(update={"resolution": resolution or scene.camera.resolution})
+    camera = scene.camera if resolution is None else scene.camera.with_columns(resolution)
     beam = scene.beam if softness is None else beam_of(scene.beam.half_angle, softness)
     return scene.model_copy(update={"camera": camera, "beam": beam})
 
@@ -117,7 +117,8 @@ def _budget(scene: Scene, sensor: Electrons) -> list[Record]:
     found: list[Record] = []
     for tip in (THEORY.low, THEORY.high):
         pose = scene.pose(np.array(tip))
-        sides = (scene.camera.resolution, scene.camera.resolution // 2)
+        columns = scene.camera.shape[1]
+        sides = (columns, columns // 2)
         free = [cramer_rao(_at(scene, resolution=side), pose, sensor) for side in sides]
         for rcm in ("free", "exact"):
             moves = [
@@ -125,7 +126,7 @@ def _budget(scene: Scene, sensor: Electrons) -> list[Record]:
                 for part in error_budget(scene, pose, rcm=rcm == "exact")
             ]
             here, coarse = (tied(bound, scene, pose, _RCM[rcm]) for bound in free)
-            pixel = 1e3 * scene.camera.sensor_width / scene.camera.resolution
+            pixel = 1e3 * scene.camera.sensor_width / columns
             wider = (coarse.position_mm - here.position_mm, coarse.axis_rad - here.axis_rad)
             moves += [
                 ("noise", 1.0, "x the sensor's", here.position_mm, here.axis_rad),
@@ -154,7 +155,7 @@ def _bumps(scene: Scene, height: float, *, rcm: bool) -> tuple[float, float]:
 
 
 def _design(scene: Scene, sensor: Electrons) -> list[Record]:
-    coarse = _at(scene, resolution=min(scene.camera.resolution, THEORY.design_resolution))
+    coarse = _at(scene, resolution=min(scene.camera.shape[1], THEORY.design_resolution))
     rigs = [(n, spread) for n in THEORY.spotlights for spread in (THEORY.spreads if n > 1 else (0.0,))]
     varied: dict[str, dict[str, Any]] = {
         "half angle": {"half_angles": THEORY.half_angles},
@@ -181,7 +182,7 @@ def _assumes(scene: Scene, sensor: Electrons) -> str:
         f" ({background} e-)^2, independent between pixels; {peak} e- where the patch is brightest; albedo uniform or"
         " known, gain and offset unknown. The budget is of an outline fit that weighs all points alike; bumps are those"
         f" of the paper, averaged over tips {THEORY.bump_ring:g} mm aside. Designs have the same {peak} e- each, at"
-        f" {min(camera.resolution, THEORY.design_resolution)} px; a beam other than `cycles` counts as hard there. Eye"
+        f" {min(camera.shape[1], THEORY.design_resolution)} px; a beam other than `cycles` counts as hard there. Eye"
         f" of {scene.eye.radius:g} mm, camera {camera.height:g} mm above the pole, half angle"
         f" {math.degrees(scene.beam.half_angle):g} deg, tips at {_TIPS}."
     )

@@ -62,16 +62,15 @@ def spotlight(scene, pose, points):
 def photograph(scene, pose, texture=None, seed=0, rays=None, noise=True):
     """A 12-bit frame: 9000 e- where the patch is brightest, 200 e- of ambient light, 15 e- of read noise."""
     rng = np.random.default_rng(seed)
-    side = scene.camera.resolution
+    size = np.array(scene.camera.shape[::-1])
     k = rays or (16 if isinstance(scene.beam, HardBeam) else 4)
-    centres = np.arange(side) + 0.5
     plain = scene.model_copy(update={"surface": Scene().surface})
-    wall = cast(plain, centres, centres)
+    wall = cast(plain, np.arange(size[0]) + 0.5, np.arange(size[1]) + 0.5)
     electrons = AMBIENT * albedo(texture, wall) * upward(scene, wall)
     outlines = [scene.camera.project(scene.outline(pose, i)) for i in range(len(scene.spotlights))]
     every = np.concatenate(outlines)
     low = np.floor(np.nanmin(every, axis=0)).astype(int).clip(2) - 2
-    high = np.ceil(np.nanmax(every, axis=0)).astype(int).clip(0, side - 2) + 2
+    high = np.ceil(np.nanmax(every, axis=0)).astype(int).clip(0, size - 2) + 2
     patch = []
     for row in range(low[1], high[1]):
         x = low[0] + (np.arange((high[0] - low[0]) * k) + 0.5) / k

@@ -1,0 +1,52 @@
+"""Localizers on frames of a camera as a microscope has it, and on those of the ideal pinhole beside them."""
+
+import math
+from functools import lru_cache
+
+import numpy as np
+import pytest
+from photographs import NOISE, fundus, photograph
+
+from conespot.localize import Localization, locate
+from conespot.scene import Camera, Scene
+from conespot.scene.beam import CyclesBeam, HardBeam
+from conespot.scene.distortion import Distortion
+from conespot.scene.sensor import Linear
+
+IDEAL = Camera(resolution=1000)
+#: fields as wide as the ideal one's; distortion moves the left and right edge by 10 px
+REAL = Camera(
+    resolution=(960, 540),
+    pixel_aspect=1.05,
+    principal_point=(500.0, 255.0),
+    distortion=Distortion(k1=-5.0, k2=200.0, p1=0.05, p2=-0.08),
+    tilt=math.radians(5.0),
+    azimuth=math.radians(30.0),
+    roll=math.radians(20.0),
+)
+TIP = np.array([1.0, 0.5, 4.0])
+
+
+@lru_cache
+def taken(real, soft):
+    scene = Scene(beam=CyclesBeam() if soft else HardBeam(), camera=REAL if real else IDEAL, sensor=Linear(bits=12))
+    return scene, photograph(scene, scene.pose(TIP), fundus(0.2))
+
+
+def missed_um(localizer, *, real, soft=False, **more):
+    scene, image = taken(real, soft)
+    found = locate(image, scene, localizer, **more)
+    assert isinstance(found, Localization), getattr(found, "reason", found)
+    return 1e3 * float(np.linalg.norm(found.apex_mm - TIP))
+
+
+@pytest.mark.parametrize("soft", [False, True], ids=["hard", "soft"])
+@pytest.mark.parametrize("localizer", ["cone", "photometric"])
+def test_an_oblong_aslant_distorting_camera_is_as_good_as_the_ideal_one(localizer, soft):
+    real, ideal = (missed_um(localizer, real=camera, soft=soft, noise=NOISE) for camera in (True, False))
+    assert real < 2.0 * ideal + 5.0
+
+
+def test_the_published_method_sees_what_such_a_camera_sees_through_the_papers_own_pinhole():
+    real, ideal = (missed_um("paper", real=camera) for camera in (True, False))
+    assert real < 2.0 * ideal + 20.0
