@@ -1,7 +1,9 @@
-"""Retinal exposure to a spotlight against ISO 15004-2:2007, Group 1. A research estimate, not a safety assessment.
+"""Retinal exposure to spotlights and microscope. A research estimate, not a safety assessment.
 
-Weights: Annex A, Table A.1 of the 2007 edition, which the 2024 edition supersedes. The limits are halved, as that
-edition asks for endoilluminators. The guide value of 10 J/cm2 for a potential hazard is unverified.
+Irradiances are held to ISO 15004-2:2007, Group 1, with its weights (Annex A, Table A.1) and its limits halved, as that
+edition asks for endoilluminators; the 2024 edition, which could not be read, supersedes it. The photochemical dose is
+that of ICNIRP (Health Physics 105:74, 2013), Eq. 18, for an aphakic eye: 1.0 MJ m-2 sr-1 seen through a pupil of 3 mm,
+with a focal length of 17 mm and 0.9 transmitted.
 """
 
 from __future__ import annotations
@@ -17,12 +19,12 @@ from conespot.scene.scene import Scene
 from conespot.scene.spectrum import Curve, mean_of, tabulated
 from conespot.scene.spotlights import spotlight_axes
 
-LABEL = "2007 edition, research estimate, not a safety assessment"
+LABEL = "limits: ISO 15004-2, 2007 edition; dose: ICNIRP 2013, aphakic; research estimate, not a safety assessment"
 #: Group 1 limits [W/m2], halved for endoilluminators: A-weighted 220 uW/cm2, R-weighted 0.7 W/cm2
 PHOTOCHEMICAL_LIMIT = 2.2 / 2.0
 THERMAL_LIMIT = 7000.0 / 2.0
-#: guide value of the A-weighted radiant exposure [J/m2], 10 J/cm2
-GUIDE_EXPOSURE = 1e5
+#: A-weighted radiant exposure of the retina [J/m2]: 1.0 MJ m-2 sr-1 through the pupil's solid angle
+PHOTOCHEMICAL_DOSE = 1.0e6 * 0.9 * (math.pi / 4.0) * (3.0 / 17.0) ** 2
 
 
 @dataclass(frozen=True)
@@ -44,17 +46,18 @@ class RetinalExposure:
         return self.thermal / THERMAL_LIMIT
 
     @property
-    def seconds_to_guide(self) -> float:
-        """Time on one place until the A-weighted exposure reaches 10 J/cm2 [s]; infinite without any such light."""
-        return GUIDE_EXPOSURE / self.photochemical if self.photochemical > 0.0 else math.inf
+    def seconds_to_dose(self) -> float:
+        """Time on one place until the A-weighted exposure is ICNIRP's dose [s]; infinite without any such light."""
+        return PHOTOCHEMICAL_DOSE / self.photochemical if self.photochemical > 0.0 else math.inf
 
     @property
     def sentence(self) -> str:
         """One line for a plan or a report, with its label."""
-        seconds = self.seconds_to_guide
-        time = (
-            f"10 J/cm2 A-weighted after {seconds / 60.0:.3g} min" if math.isfinite(seconds) else "no A-weighted light"
-        )
+        minutes = self.seconds_to_dose / 60.0
+        dose = f"{PHOTOCHEMICAL_DOSE / 1e4:.2g} J/cm2 A-weighted"
+        time = f"{dose} after {minutes:.3g} min, half of it after {minutes / 2.0:.3g}"
+        if math.isinf(minutes):
+            time = "no A-weighted light"
         return (
             f"peak retinal irradiance {self.irradiance / 10.0:.3g} mW/cm2; A-weighted {self.photochemical / 10.0:.3g} "
             f"mW/cm2 ({self.photochemical_ratio:.3g} x limit), R-weighted {self.thermal / 10.0:.3g} mW/cm2 "
@@ -72,11 +75,17 @@ def exposure(irradiance: float, spectrum: Curve) -> RetinalExposure:
     """The exposure of an irradiance [W/m2] of a light of this spectrum.
 
     >>> from conespot.scene.illumination import Line
-    >>> exposure(1000.0, Line(wavelength=850.0).spectrum).seconds_to_guide  # no photochemical hazard in the infrared
+    >>> exposure(1000.0, Line(wavelength=850.0).spectrum).seconds_to_dose  # no photochemical hazard in the infrared
     inf
     """
     photochemical, thermal = hazard_fractions(spectrum)
     return RetinalExposure(irradiance, irradiance * photochemical, irradiance * thermal)
+
+
+def together(*exposures: RetinalExposure) -> RetinalExposure:
+    """The exposure to several lights on one place."""
+    parts = [(e.irradiance, e.photochemical, e.thermal) for e in exposures]
+    return RetinalExposure(*(sum(values) for values in zip(*parts, strict=True)))
 
 
 def disc_irradiance(flux: float, half_angle: float, distance: float) -> float:
@@ -102,9 +111,13 @@ def peak_irradiance(scene: Scene, pose: Pose, power_w: float) -> float:
 
 
 def scene_exposure(scene: Scene, poses: list[Pose], power_w: float) -> RetinalExposure:
-    """The worst exposure over poses, with each spotlight at `power_w` [W] in the scene's convention."""
+    """The worst exposure over poses, with each spotlight at `power_w` [W] in the scene's convention.
+
+    The microscope's light is added as where it falls straight on the retina.
+    """
     worst = max((peak_irradiance(scene, pose, power_w) for pose in poses), default=0.0)
-    return exposure(worst, scene.illumination.spectrum)
+    microscope = exposure(scene.ambient.irradiance, scene.ambient.illumination.spectrum)
+    return together(exposure(worst, scene.illumination.spectrum), microscope)
 
 
 def _cone_points(scene: Scene, pose: Pose, axis: ArrayLike) -> NDArray[np.float64]:

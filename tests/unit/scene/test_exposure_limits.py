@@ -6,19 +6,34 @@ import pytest
 
 from conespot.scene import Scene
 from conespot.scene.beam import CyclesBeam, HardBeam
-from conespot.scene.exposure_limits import disc_irradiance, exposure, hazard_fractions, peak_irradiance, scene_exposure
-from conespot.scene.illumination import LIGHTS, FlatBand
+from conespot.scene.exposure_limits import (
+    PHOTOCHEMICAL_DOSE,
+    PHOTOCHEMICAL_LIMIT,
+    disc_irradiance,
+    exposure,
+    hazard_fractions,
+    peak_irradiance,
+    scene_exposure,
+)
+from conespot.scene.illumination import LIGHTS, Ambient, FlatBand
 from conespot.scene.pose import Pose
 from conespot.scene.power import Power
 from conespot.scene.spotlights import RIGS
 
 
 def test_ten_milliwatts_of_white_led():
-    """10 mW of LED-B3 in a 20 deg cone at 10 mm; against 24.0 mW/cm2, A-weighted 4.19, 10 J/cm2 after 39.8 min."""
+    """10 mW of LED-B3, 20 deg, 10 mm away; against 24.0 mW/cm2, A-weighted 4.19, ICNIRP's 2.2 J/cm2 after 8.8 min."""
     found = exposure(disc_irradiance(10e-3, math.radians(20.0), 10.0), LIGHTS["led-b3"].spectrum)
     assert found.irradiance / 10.0 == pytest.approx(24.0, abs=0.05)
     assert found.photochemical / 10.0 == pytest.approx(4.19, abs=0.005)
-    assert found.seconds_to_guide / 60.0 == pytest.approx(39.8, abs=0.05)
+    assert found.seconds_to_dose / 60.0 == pytest.approx(8.76, abs=0.03)
+    assert "2.2 J/cm2 A-weighted after 8.7" in found.sentence
+    assert "half of it after 4.3" in found.sentence
+
+
+def test_the_dose_of_icnirp_and_the_limit_of_the_2007_edition_agree():
+    """2.2 J/cm2 over 10^4 s against 220 uW/cm2, which the 2007 edition has before it is halved."""
+    assert 2.0 * PHOTOCHEMICAL_LIMIT * 1e4 == pytest.approx(PHOTOCHEMICAL_DOSE, rel=0.01)
 
 
 @pytest.mark.parametrize(
@@ -51,14 +66,26 @@ def test_overlapping_spotlights_add_up():
 
 
 def test_infrared_has_no_photochemical_hazard_and_says_its_label():
-    """IR 850 exposure; against no time to 10 J/cm2, the thermal fraction, and the label in its sentence."""
-    scene = Scene(illumination=LIGHTS["ir850"])
+    """IR 850 exposure; against no time to the dose, the thermal fraction, and the label in its sentence."""
+    scene = Scene(illumination=LIGHTS["ir850"], ambient=Ambient(irradiance=0.0))
     found = scene_exposure(scene, [scene.pose([0.0, 0.0, z]) for z in (3.0, 6.0)], 1.0)
     assert found.photochemical == 0.0
-    assert math.isinf(found.seconds_to_guide)
+    assert math.isinf(found.seconds_to_dose)
     assert found.thermal == pytest.approx(0.49 * found.irradiance, rel=0.01)
     assert found.irradiance == pytest.approx(peak_irradiance(scene, scene.pose([0.0, 0.0, 3.0]), 1.0))
-    assert "2007 edition, research estimate, not a safety assessment" in found.sentence
+    assert "no A-weighted light (limits: ISO 15004-2, 2007 edition; dose: ICNIRP 2013, aphakic" in found.sentence
+    assert "research estimate, not a safety assessment" in found.sentence
+
+
+def test_the_microscope_s_light_is_added_with_its_own_hazard():
+    """850 nm from the needle and 100 W/m2 of a white LED from above; against their sum, and the LED's A-weight."""
+    infrared, white = LIGHTS["ir850"], LIGHTS["led-b3"]
+    dark = Scene(illumination=infrared, ambient=Ambient(irradiance=0.0, illumination=white))
+    lit = Scene(illumination=infrared, ambient=Ambient(irradiance=100.0, illumination=white))
+    pose = dark.pose([0.0, 0.0, 3.0])
+    alone, added = scene_exposure(dark, [pose], 0.01), scene_exposure(lit, [pose], 0.01)
+    assert added.irradiance == pytest.approx(alone.irradiance + 100.0)
+    assert added.photochemical == pytest.approx(100.0 * hazard_fractions(white.spectrum)[0])
 
 
 def test_the_paper_s_white_light_exceeds_group_1_at_full_power():
