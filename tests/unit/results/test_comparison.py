@@ -110,7 +110,7 @@ def test_a_run_gets_text_table_and_figures_with_its_exposures(two_lights, make_r
     assert (folder / "comparison.txt").read_text() == text
     assert "ir850: peak retinal irradiance" in text
     assert "ir850 assumes: radius: 12.5 mm; edge: Cycles blend 1 (fully soft), half angle 9 deg; power conv" in text
-    assert "2007 edition, research estimate, not a safety assessment" in text
+    assert "2007 edition; dose: ICNIRP 2013, aphakic; research estimate, not a safety assessment" in text
     assert {"median_mm", "p", "pairs", "failed_a"} <= set(pd.read_csv(folder / "tables" / "comparison.csv").columns)
     assert len(list((folder / "figures").glob("comparison_ir850_led-b3_*"))) == 2
 
