@@ -17,6 +17,9 @@ from conespot.scene.atomic import write_atomically
 from conespot.scene.document import dump
 from conespot.scene.spectrum import Curve
 
+#: what a frame may claim before it is unpacked: pixels a side, channels, values a byte (ZIP packs 258, no more)
+_MOST_PIXELS, _MOST_CHANNELS, _MOST_SAMPLES = 20_000, 16, 300
+
 
 def frame_header(scene: Scene, pose: Pose, power_w: float, versions: Mapping[str, str]) -> dict[str, str | float]:
     """What a frame's EXR header says: pose, power, wavelengths, response curves, versions and the scene."""
@@ -78,16 +81,32 @@ def write_frame(path: Path, radiance: NDArray[np.float32], header: Mapping[str, 
 
 
 def read_frame(path: Path) -> tuple[NDArray[np.float32], dict[str, object]]:
-    """Radiance `[H, W, C]` and the header of a frame. Raises InputError if the file is no such frame."""
+    """Radiance `[H, W, C]` and the header of a frame, which may be a stranger's.
+
+    Raises InputError if the file is no such frame, or claims a size that no camera has.
+    """
     import OpenEXR
 
+    if not path.is_file():
+        raise InputError(f"{path}: cannot be read as a conespot frame: no such file")
     try:
+        with OpenEXR.File(str(path), header_only=True) as file:
+            if len(file.parts) != 1:
+                raise ValueError("it holds several images")
+            low, high = (np.asarray(corner, float) for corner in file.header()["dataWindow"])
+            channels = len(file.header()["channels"])
+        width, height = (high - low + 1.0).astype(int)
+        if not (1 <= width <= _MOST_PIXELS and 1 <= height <= _MOST_PIXELS and 1 <= channels <= _MOST_CHANNELS):
+            raise ValueError(f"{width} x {height} px of {channels} channels are no camera's")
+        if width * height * channels > _MOST_SAMPLES * max(1, path.stat().st_size):
+            raise ValueError(f"{path.stat().st_size} bytes cannot hold {width} x {height} px of {channels} channels")
         with OpenEXR.File(str(path), separate_channels=True) as file:
-            header, channels = dict(file.header()), file.channels()
-            names = ["Y"] if "Y" in channels else sorted((n for n in channels if n[0] == "C"), key=lambda n: int(n[1:]))
-            radiance = np.stack([channels[name].pixels for name in names], axis=-1).astype(np.float32)
-    except (OSError, RuntimeError, ValueError, KeyError) as error:
-        raise InputError(f"{path}: cannot be read as a conespot frame: {error}") from None
+            header, found = dict(file.header()), file.channels()
+            names = ["Y"] if "Y" in found else [f"C{i}" for i in range(len(found))]
+            radiance = np.stack([found[name].pixels for name in names], axis=-1).astype(np.float32)
+    except (OSError, RuntimeError, ValueError, KeyError, TypeError, MemoryError) as error:
+        reason = " ".join(str(error).split()) or type(error).__name__
+        raise InputError(f"{path}: cannot be read as a conespot frame: {reason}") from None
     return radiance, header
 
 

@@ -94,6 +94,8 @@ def read_cases(folder: Path) -> dict[str, Case]:
     path = folder / FILE
     if not path.exists():
         return {}
+    if not path.is_file() and not path.is_dir():  # a pipe would be waited for
+        raise InputError(f"{path}: cannot be read: is no file")
     found: dict[str, Case] = {}
     for number, line in _lines(path):
         try:

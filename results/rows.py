@@ -98,6 +98,8 @@ def read_table(path: Path, max_rows: int, text: Sequence[str] = ()) -> pa.Table:
                 meta = file.metadata
                 inflated = sum(meta.row_group(i).total_byte_size for i in range(meta.num_row_groups))
                 _bound(path, meta.num_rows, meta.num_columns, max_rows)
+                if any(pa.types.is_nested(field.type) for field in file.schema_arrow):
+                    raise InputError(f"{path}: a column holds lists or records, which no run's rows have")
                 if inflated > 4 * _MAX_BYTES:
                     raise InputError(f"{path}: unpacks to {inflated // 1_000_000} MB, which no run's rows need")
                 table = file.read()

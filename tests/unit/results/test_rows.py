@@ -152,6 +152,10 @@ def test_what_is_too_large_is_refused(refused, frame, monkeypatch, bound, said):
     assert said in refused(frame)
 
 
+def test_a_column_of_lists_is_refused_before_it_is_unpacked(frame, refused):
+    assert "a column holds lists or records" in refused(frame.assign(est_many=[[0.0] * 1000] * len(frame)))
+
+
 def test_a_repeated_csv_column_is_refused(tmp_path):
     path = tmp_path / "errors.csv"
     path.write_text("case,case\na,b\n")
