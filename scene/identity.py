@@ -50,6 +50,8 @@ def _essence(value: object, written: Any) -> Any:
             if (name == "kind" or name not in default or plain != default[name])
             and not (name == "file" and written.get("points"))
         }
+    if isinstance(value, dict):
+        return {name: _essence(item, written[name]) for name, item in value.items()}
     if isinstance(value, tuple) and value and isinstance(value[0], BaseModel):
         return [_essence(item, plain) for item, plain in zip(value, written, strict=True)]
     return written

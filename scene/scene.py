@@ -9,14 +9,14 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import model_validator
+from pydantic import Field, model_validator
 
 from conespot.scene.beam import Beam, CyclesBeam
 from conespot.scene.camera import Camera
 from conespot.scene.document import Document, find_document, is_file, merge, read_document
 from conespot.scene.eye import Eye, Globe
 from conespot.scene.illumination import Ambient, FlatBand, Illumination
-from conespot.scene.model import Model
+from conespot.scene.model import Model, unknown_name
 from conespot.scene.pose import Pose, cone_rays
 from conespot.scene.power import Power
 from conespot.scene.retina import PhotoRetina, Retina
@@ -41,14 +41,34 @@ class Scene(Model):
     retina: Retina = PhotoRetina()
     sensor: Sensor = Srgb8()
     interreflection: Globe | None = None
+    #: by name, all that look at the same instant, of which `camera` is one: a stereo pair's left and right
+    cameras: dict[str, Camera] = Field({}, max_length=8)
+
+    @model_validator(mode="before")
+    @classmethod
+    def _named_camera(cls, data: Any) -> Any:
+        if not (isinstance(data, dict) and isinstance(data.get("camera"), str)):
+            return data
+        cameras = data.get("cameras")
+        if not isinstance(cameras, dict) or data["camera"] not in cameras:
+            raise unknown_name(data["camera"], list(cameras or ()), "camera")
+        return {**data, "camera": cameras[data["camera"]]}
 
     @model_validator(mode="after")
     def _fits(self) -> Scene:
         surface, radius = self.surface, self.eye.radius
-        if self.camera.centre[2] <= 2.0 * radius * max(1.0, surface.semi_axes[2]):
-            raise ValueError("camera.height must put the camera above the eye (more than twice eye.radius)")
-        if not self.camera.is_plain and not self._is_seen():
-            raise ValueError("camera: no ray of it meets the retina; check look_at, tilt and principal_point")
+        if self.cameras and self.camera not in self.cameras.values():
+            raise ValueError(f"camera must be the name of one of cameras: {', '.join(self.cameras)}")
+        for camera in [self.camera, *self.cameras.values()]:
+            if camera.centre[2] <= 2.0 * radius * max(1.0, surface.semi_axes[2]):
+                raise ValueError("camera.height must put the camera above the eye (more than twice eye.radius)")
+            if not camera.is_plain and not _sees(camera, self.eye):
+                raise ValueError("camera: no ray of it meets the retina; check look_at, tilt and principal_point")
+        return self
+
+    @model_validator(mode="after")
+    def _has_a_surface(self) -> Scene:
+        surface, radius = self.surface, self.eye.radius
         for bump in surface.bumps:
             if np.hypot(bump.x, bump.y) >= radius:
                 raise ValueError(f"the bump at ({bump.x:g}, {bump.y:g}) mm lies outside the eye")
@@ -60,12 +80,9 @@ class Scene(Model):
             raise ValueError("interreflection is worked out in a sphere: leave semi_axes and height_map out of surface")
         return self
 
-    def _is_seen(self) -> bool:
-        """Whether some of the camera's rays meet the eye."""
-        rows, columns = self.camera.shape
-        x, y = np.meshgrid(np.linspace(0.0, columns, 17), np.linspace(0.0, rows, 17))
-        rays = self.camera.rays(np.stack([x, y], axis=-1))
-        return bool(np.any(np.isfinite(self.eye.intersect(rays.origins, rays.directions))))
+    def through(self, name: str) -> Scene:
+        """The scene as another of its `cameras` sees it at the same instant. Raises KeyError for no such camera."""
+        return self.model_copy(update={"camera": self.cameras[name]})
 
     def pose(self, apex: NDArray[np.float64]) -> Pose:
         """The pose of the tip at `apex` `[3]` [mm]. Raises ValueError if it is outside the eye or in its wall."""
@@ -92,6 +109,14 @@ class Scene(Model):
         axis = spotlight_axes(pose, self.spotlights)[spotlight]
         rays = cone_rays(axis, self.beam.half_angle, np.arange(points) * 2.0 * np.pi / points)
         return self.surface.intersect(self.eye, pose.apex, rays)
+
+
+def _sees(camera: Camera, eye: Eye) -> bool:
+    """Whether some of the camera's rays meet the eye."""
+    rows, columns = camera.shape
+    x, y = np.meshgrid(np.linspace(0.0, columns, 17), np.linspace(0.0, rows, 17))
+    rays = camera.rays(np.stack([x, y], axis=-1))
+    return bool(np.any(np.isfinite(eye.intersect(rays.origins, rays.directions))))
 
 
 def read_scene(document: Document, *, at: tuple[str | int, ...] = ()) -> Scene:
