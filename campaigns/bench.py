@@ -16,9 +16,6 @@ from conespot.campaigns.row import Finding, Record
 from conespot.localize import LocalizationFailure, find_localizer, locate
 from conespot.localize.image import AnyImage, Reference
 from conespot.localize.outcome import Outcome
-from conespot.localize.sequence import AmbientMap
-from conespot.localize.theory.assessment import electrons_of
-from conespot.localize.theory.bounds import cramer_rao
 from conespot.scene import Pose
 
 if TYPE_CHECKING:
@@ -114,6 +111,9 @@ class Bench:
         """The root mean square error of the tip [mm] that no estimator with the case's knowledge beats."""
         if not self._plan.campaign.bounds:
             return None
+        from conespot.localize.theory.assessment import electrons_of
+        from conespot.localize.theory.bounds import cramer_rao
+
         try:
             return cramer_rao(case.scene, pose, electrons_of(case.scene), case.knowledge.knowns).position_mm
         except ValueError:
@@ -134,6 +134,8 @@ class Bench:
 
     def _learn(self, unit: Unit, case: Case, exposure: Exposure) -> Reference | None:
         """What frames of the trajectory show outside their own patches, found without the truth."""
+        from conespot.localize.sequence import AmbientMap
+
         group = self._plan.groups[unit.group]
         renderer = self._scene(group)[0]
         ambient = AmbientMap(case.scene)

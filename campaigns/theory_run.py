@@ -29,12 +29,14 @@ def write_theory_of(name: str, settings: Sequence[str], out: str | None) -> tupl
     from conespot.localize.theory.assessment import assess
     from conespot.results.theory_tables import write_theory_tables
 
-    found = assess(described_scene(name, settings))
+    scene = described_scene(name, settings)
     folder = Path(out or Path("runs") / f"theory-{Path(name).stem}")
+    if folder.is_file():
+        raise InputError(f"{folder}: is a file, not a folder; choose another --out")
+    found = assess(scene)
     try:
         folder.mkdir(parents=True, exist_ok=True)
     except OSError as error:
-        reason = "is a file, not a folder" if folder.is_file() else f"cannot be written: {error.strerror}"
-        raise InputError(f"{folder}: {reason}; choose another --out") from None
+        raise InputError(f"{folder}: cannot be written: {error.strerror}; choose another --out") from None
     tables = {"table_1": found.table_1, "bounds": found.bounds, "budget": found.budget, "design": found.design}
     return folder, write_theory_tables(folder, tables, name, found.assumes)

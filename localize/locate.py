@@ -7,13 +7,11 @@ from collections.abc import Iterator
 
 from numpy.typing import ArrayLike
 
-from conespot.localize.cone import cone
 from conespot.localize.image import AnyImage, Reference, checked
 from conespot.localize.localizer import Beside, Localizer
 from conespot.localize.model.noise import NoiseModel
 from conespot.localize.model.prior import Knowns
 from conespot.localize.outcome import Outcome
-from conespot.localize.photometric import photometric
 from conespot.localize.plugin import load_plugin, plugins
 from conespot.localize.published.methods import paper, paper_code, paper_code_float, paper_code_oracle
 from conespot.scene import InputError, Pose, Scene
@@ -24,11 +22,16 @@ def _oracle(image: AnyImage, scene: Scene, beside: Beside) -> Outcome:
     return paper_code_oracle(image, scene, beside.truth)
 
 
+# the fits are imported where they are used: they load scipy, for which every process of a campaign would wait
 def _cone(image: AnyImage, scene: Scene, beside: Beside) -> Outcome:
+    from conespot.localize.cone import cone
+
     return cone(image, scene, knowns=beside.knowns, reference=beside.reference, noise=beside.noise)
 
 
 def _photometric(image: AnyImage, scene: Scene, beside: Beside) -> Outcome:
+    from conespot.localize.photometric import photometric
+
     return photometric(image, scene, knowns=beside.knowns, reference=beside.reference, noise=beside.noise)
 
 

@@ -6,6 +6,7 @@ import time
 
 import pytest
 
+from conespot.campaigns.command import main
 from conespot.scene.document import shipped
 
 CAMPAIGN = [sys.executable, "-m", "conespot"]
@@ -40,11 +41,13 @@ def test_list_names_every_shipped_campaign(tmp_path):
 
 
 @pytest.mark.parametrize("name", sorted(shipped("campaigns", "")))
-def test_every_shipped_campaign_is_valid_and_shows_itself(tmp_path, name):
-    assert campaign("validate", name, cwd=tmp_path).returncode == 0
-    shown = campaign("show", name, cwd=tmp_path).stdout
+def test_every_shipped_campaign_is_valid_and_shows_itself(tmp_path, monkeypatch, capsys, name):
+    monkeypatch.chdir(tmp_path)
+    assert main(["validate", name]) == main(["show", name]) == 0
+    _, _, shown = capsys.readouterr().out.partition("\n")
     (tmp_path / "copy.yaml").write_text(shown)
-    assert campaign("validate", "copy.yaml", cwd=tmp_path).stdout.startswith("copy.yaml: valid")
+    assert main(["validate", "copy.yaml"]) == 0
+    assert capsys.readouterr().out.startswith("copy.yaml: valid")
 
 
 def test_plan_and_dry_run_say_the_same_and_write_nothing(tmp_path):

@@ -6,6 +6,8 @@ import sys
 import pandas as pd
 import pytest
 
+from conespot.campaigns.command import main
+
 CAMPAIGN = [sys.executable, "-m", "conespot"]
 FILES = {"table_1.csv", "bounds.csv", "budget.csv", "design.csv", "theory.txt"}
 FILES |= {f"{name}.{kind}" for name in ("budget", "design") for kind in ("png", "svg")}
@@ -90,11 +92,12 @@ def test_the_design_guidance_prefers_wide_cones_and_hard_edges(found):
         (["--out", "mine.yaml"], "mine.yaml: is a file, not a folder; choose another --out"),
     ],
 )
-def test_bad_input_is_refused_in_one_sentence(tmp_path, arguments, says):
+def test_bad_input_is_refused_in_one_sentence(tmp_path, monkeypatch, capsys, arguments, says):
     (tmp_path / "mine.yaml").write_text("eys: {radius: 12 mm}\n")
-    done = theory(*arguments, cwd=tmp_path)
-    assert done.returncode == 2
-    assert says in done.stderr
-    assert len(done.stderr.splitlines()) == 1
-    assert done.stdout == ""
+    monkeypatch.chdir(tmp_path)
+    assert main(["theory", *arguments]) == 2
+    said = capsys.readouterr()
+    assert says in said.err
+    assert len(said.err.splitlines()) == 1
+    assert said.out == ""
     assert not list(tmp_path.rglob("*.csv"))

@@ -44,6 +44,15 @@ def leaves(image, scene):
 
 none = 5
 """
+#: the command without figures, which of nine localizers take a minute
+UNDRAWN = """\
+import sys
+from conespot.results import writing
+from conespot.campaigns.command import main
+
+writing.plan_figures = lambda run, boxes: ([], 0)
+sys.exit(main())
+"""
 NAMES = ["brightest", "told", "seer", "raises", "writes", "answers_a_word", "answers_nan", "leaves"]
 
 
@@ -67,7 +76,7 @@ def installed(tmp_path_factory):
 def campaign(installed, tmp_path):
     def run(*arguments):
         environment = {**os.environ, "PYTHONPATH": str(installed)}
-        command = [sys.executable, "-m", "conespot", *map(str, arguments)]
+        command = [sys.executable, "-c", UNDRAWN, *map(str, arguments)]
         return subprocess.run(command, cwd=tmp_path, env=environment, capture_output=True, text=True, timeout=120)
 
     return run

@@ -6,6 +6,7 @@ import pytest
 from conespot.campaigns.ending import RunError
 from conespot.campaigns.row import Finding, Record
 from conespot.campaigns.session import renew_rows, run_campaign
+from conespot.results import writing
 from conespot.results.run import load_run
 from conespot.scene import InputError
 
@@ -44,6 +45,12 @@ def run(tmp_path):
     return go
 
 
+@pytest.fixture
+def undrawn(monkeypatch):
+    """Results without figures, which take most of the time of a run that renders nothing."""
+    monkeypatch.setattr(writing, "plan_figures", lambda run, boxes: ([], 0))
+
+
 def rows_of(folder):
     return pd.read_csv(folder / "errors.csv", keep_default_na=False)
 
@@ -58,6 +65,7 @@ def test_whoever_works_a_plan_off_the_folder_holds_all_that_a_run_writes(run, ca
     assert "4 poses, 8 frames, 16 localizations" in said.err
 
 
+@pytest.mark.usefixtures("undrawn")
 def test_lost_poses_are_said_when_all_else_is_written_and_are_tried_again(run, tmp_path):
     with pytest.raises(RunError, match="1 poses were lost, the first: lost in thought; the same command retries them"):
         run(AtOnce(loses=[2]))
@@ -69,6 +77,7 @@ def test_lost_poses_are_said_when_all_else_is_written_and_are_tried_again(run, t
     assert again.asked == [2]
 
 
+@pytest.mark.usefixtures("undrawn")
 def test_an_interruption_keeps_what_is_finished_and_the_same_call_goes_on(run, tmp_path):
     with pytest.raises(KeyboardInterrupt, match="2 of 4 poses are kept"):
         run(AtOnce(interrupted_at=2))
@@ -78,12 +87,14 @@ def test_an_interruption_keeps_what_is_finished_and_the_same_call_goes_on(run, t
     assert again.asked == [2, 3]
 
 
+@pytest.mark.usefixtures("undrawn")
 def test_settings_win_over_the_file_and_a_wrong_one_is_named(run):
     assert len(rows_of(run(AtOnce(), settings={"poses": "2"}))) == 8
     with pytest.raises(InputError, match=r"settings\['posse'\]: posse: unknown key 'posse'; did you mean 'poses'"):
         run(AtOnce(), settings={"posse": "2"})
 
 
+@pytest.mark.usefixtures("undrawn")
 def test_the_order_of_localizers_is_no_other_campaign(run, tmp_path):
     run(AtOnce(loses=[1, 2]), settings={"poses": "1"})
     (tmp_path / "c.yaml").write_text(TEXT.replace("[paper, paper-code]", "[paper-code, paper]"))
@@ -92,6 +103,7 @@ def test_the_order_of_localizers_is_no_other_campaign(run, tmp_path):
     assert turned.asked == []
 
 
+@pytest.mark.usefixtures("undrawn")
 def test_rows_are_renewed_from_the_journal_where_it_can_be_understood_and_kept_where_not(run, tmp_path):
     """errors.csv deleted and made again; then with a localizer that is not installed, with rows and without."""
     folder = run(AtOnce())
