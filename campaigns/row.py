@@ -9,11 +9,10 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Annotated
 
 import numpy as np
-from pydantic import Field, FiniteFloat, model_validator
+from pydantic import BaseModel, ConfigDict, Field, FiniteFloat, model_validator
 
 from conespot.results.columns import TIP, TIP_ERROR, TIP_SIGMA, TRUE_TIP
 from conespot.scene import Pose, Scene
-from conespot.scene.model import Model
 
 if TYPE_CHECKING:
     pass
@@ -24,7 +23,13 @@ _NAN = math.nan
 _NOWHERE = (_NAN, _NAN, _NAN)
 
 
-class Finding(Model):
+class _Line(BaseModel):
+    """What stands in a journal, a million times: read without Python's help, since nobody misspells its keys."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid")
+
+
+class Finding(_Line):
     """What one localizer answered on one frame: a pose, or a `reason` why there is none."""
 
     case: str = Field(max_length=64)
@@ -48,7 +53,7 @@ class Finding(Model):
         return self
 
 
-class Record(Model):
+class Record(_Line):
     """A finished unit of work: its findings, or the `error` that lost it; `by` is its maker (campaigns.maker)."""
 
     unit: str = Field(max_length=64)

@@ -20,6 +20,7 @@ from conespot.results.variants import ordered
 
 _PANELS = (("Position", "position_error_mm"), ("Rotation", "rotation_error_deg"))
 _MOST_RIGS = 4
+_MOST_POWERS = 60  #: more boxes than that nobody tells apart
 _PAPER: dict[str, Any] = {"markersize": 6.0, "markerfacecolor": "none", "color": COLOURS["paper"]}
 _TUKEY = (
     "Boxes: quartiles; line: median; dot: mean; whiskers: farthest values within 1.5 interquartile ranges (Tukey); "
@@ -49,7 +50,9 @@ class OverPower(FigureKind):
             for power in (float(powers.min()), float(powers.max()))
         )
         counted = f"{failed} of {frames} frames failed{red}; boxes hold the others. From {least} to {most}."
-        return f"{_TUKEY} {counted}\n{cut.assumed}"
+        count, shown = int(powers.nunique()), len(_shown(cut.boxes))
+        thinned = f" {shown} of {count} powers are drawn, boxes.csv holds all." if shown < count else ""
+        return f"{_TUKEY} {counted}{thinned}\n{cut.assumed}"
 
     def draw(self, cut: Cut, title: str, caption: str) -> Figure:
         """The figure, from the stored boxes alone."""
@@ -62,7 +65,8 @@ def power_figure(boxes: pd.DataFrame, title: str, caption: str, source: str | No
     `boxes` are those of one variant, surface and trajectory; `source` names the table whose AE at 1 W is drawn.
     """
     rigs = ordered(boxes["spotlights"])[:_MOST_RIGS]
-    powers = sorted(boxes["power_w"].unique())
+    powers = _shown(boxes)
+    boxes = boxes[boxes["power_w"].isin(powers)]
     wide = max(4.2, 0.9 + 0.42 * len(powers))
     figure = Figure(figsize=(min(1.6 + wide * max(len(rigs), 1.3), 30.0), 6.8), layout="constrained")
     frame(figure, title, caption)
@@ -88,6 +92,13 @@ def power_figure(boxes: pd.DataFrame, title: str, caption: str, source: str | No
         axes.set_xlim(-0.6, len(powers) - 0.4)
         axes.set_xlabel("light power [W]")
     return figure
+
+
+def _shown(boxes: pd.DataFrame) -> list[float]:
+    """The powers that are drawn: all, or so many of them from the least to the most."""
+    powers = sorted(boxes["power_w"].unique())
+    places = np.linspace(0, len(powers) - 1, min(len(powers), _MOST_POWERS)).round().astype(int)
+    return [powers[i] for i in places]
 
 
 def _draw(axes: Axes, boxes: pd.DataFrame, powers: list[float]) -> None:
