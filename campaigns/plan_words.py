@@ -103,6 +103,8 @@ def tile_rays(group: Group, pose: Pose, spotlight: int) -> float:
     """Samples traced for the rectangle that holds a spotlight's patch, and for its edge."""
     scene = group.scene
     edge = scene.camera.project(scene.outline(pose, spotlight, points=32))
+    # through the eye's optics all that the pupil shows may lie within an outline that no ray meets
+    edge = edge if np.isfinite(edge).all() else np.array([[0.0, 0.0], scene.camera.shape[::-1]])
     inside = np.clip(edge, 0.0, scene.camera.shape[::-1])
     rays = float(np.prod(np.ptp(inside, axis=0))) * group.samples
     if group.edge_samples > group.samples:

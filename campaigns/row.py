@@ -159,4 +159,4 @@ def in_frame(pose: Pose, scene: Scene) -> float:
     """The share of the patches' outline at a pose that a scene's frame shows."""
     edge = np.concatenate([scene.outline(pose, k, points=64) for k in range(len(scene.spotlights))])
     pixels = scene.camera.project(edge)  # NaN where a ray misses the eye compares as outside
-    return float(np.mean(np.all((pixels >= 0.0) & (pixels <= scene.camera.shape[::-1]), axis=-1)))
+    return float(np.mean(scene.camera.shows(pixels)))

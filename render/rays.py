@@ -12,7 +12,7 @@ from conespot.scene import Camera
 from conespot.scene.distortion import Distortion
 
 if TYPE_CHECKING:
-    from drjit.auto.ad import Float
+    from drjit.auto.ad import Bool, Float
     from mitsuba import RayDifferential3f, Spectrum
 
 #: Newton's steps against distortion end where they are this close to the inverse [px]
@@ -26,7 +26,7 @@ class RayGenerator:
     """
 
     def __init__(self, camera: Camera, near: float) -> None:
-        """Rays begin at a depth of `near` [mm] along the camera's axis, so that nothing above hides the retina."""
+        """Rays begin `near` [mm] down the camera's axis, or in the vitreous, so that nothing above hides the retina."""
         mi, _, _ = kernel.load()
         focal_length = camera.focal_length_px
         self._middle = _held(camera.principal.tolist())
@@ -36,9 +36,18 @@ class RayGenerator:
         upright = camera.tilt == camera.roll == 0.0
         self._axes = None if upright else [mi.Vector3f(*_held(axis)) for axis in camera.axes.tolist()]
         self._near = _held([near])[0]
+        self._optics = camera.optics
 
-    def rays(self, x: Float, y: Float, wavelengths: Spectrum) -> RayDifferential3f:
-        """The rays of film positions (x, y) [px], x to the right and y down, with their wavelengths [nm]."""
+    @property
+    def disperses(self) -> bool:
+        """Whether light of each wavelength has a way of its own; then all of a ray's must be alike."""
+        return self._optics is not None
+
+    def rays(self, x: Float, y: Float, wavelengths: Spectrum) -> tuple[RayDifferential3f, Bool | bool]:
+        """The rays of film positions (x, y) [px], x to the right and y down, with their wavelengths [nm].
+
+        And which of them reach the vitreous: the iris stops some.
+        """
         mi, dr, _ = kernel.load()
         across, down = (x - self._middle[0]) * self._pixel[0], (y - self._middle[1]) * self._pixel[1]
         if self._lens is not None:
@@ -50,7 +59,14 @@ class RayGenerator:
             right, up, back = self._axes
             direction = (right * across - up * down - back) / per_depth
         origin = self._origin + direction * (self._near * per_depth)
-        return mi.RayDifferential3f(origin, direction, wavelengths=wavelengths)
+        if self._optics is None:
+            return mi.RayDifferential3f(origin, direction, wavelengths=wavelengths), True
+        entry, way, off = self._optics.enter(tuple(origin), tuple(direction), wavelengths[0], dr.sqrt)
+        seen = off <= 1.0  # nor is what is no number
+        # those that are stopped go down the axis, since nothing should trace a ray without direction
+        origin = dr.select(seen, mi.Point3f(*entry), mi.Point3f(0.0, 0.0, self._optics.iris))
+        direction = dr.select(seen, mi.Vector3f(*way), mi.Vector3f(0.0, 0.0, -1.0))
+        return mi.RayDifferential3f(origin, direction, wavelengths=wavelengths), seen
 
 
 class _Lens:

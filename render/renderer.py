@@ -111,7 +111,13 @@ class Renderer:
         # three times the relief covers any incidence up to 70 deg
         reach = np.concatenate([length + k * scene.surface.relief for k in (-3.0, 0.0, 3.0)])
         points = pose.apex + np.tile(rays / length, (3, 1)) * np.maximum(reach, 0.0)
-        return Crop.around(scene.camera.project(points), scene.camera.shape, margin=2.0)
+        camera = scene.camera
+        if camera.optics is None:
+            return Crop.around(camera.project(points), camera.shape, margin=2.0)
+        light = scene.illumination.spectrum  # whose colours end in different places
+        pixels = np.concatenate([camera.seeing(w).project(points) for w in (light.low, light.high)])
+        # an outline that no ray meets may run around all that the pupil shows
+        return Crop.around(pixels, camera.shape, margin=2.0) if np.isfinite(pixels).all() else Crop.whole(camera.shape)
 
     def background(self, pose: Pose | None = None) -> Image:
         """The radiance `[H, W, C]` [W m-2 sr-1] in ambient light alone. With a visible shaft it needs the pose."""
@@ -131,7 +137,7 @@ class Renderer:
     def _empty_background(self) -> Image:
         """Kept on disk under all that it shows: not the instrument, nor its light."""
         scene, (rows, columns) = self.scene, self.scene.camera.shape
-        channels = spectral.channels(scene, scene.ambient.illumination, self._responses)
+        channels = spectral.channels(scene, scene.ambient.illumination, self._responses, from_outside=True)
         shown = scene.model_dump(include={"eye", "camera", "surface", "retina", "ambient"})
         films = [(channel.film.wavelengths.tolist(), channel.film.values.tolist()) for channel in channels]
         how = (self._kernel.variant, self._kernel.llvm, self._background_samples, BACKGROUND_SEED)

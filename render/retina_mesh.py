@@ -21,14 +21,25 @@ VERTEX_SPACING = 0.03
 
 def arc_extent(scene: Scene) -> float:
     """Half the side [mm] of the square, in arc coordinates, that holds all the retina the camera can see."""
+    limit = scene.eye.radius * math.pi / 2.0
+    if scene.camera.optics is not None:
+        return _through_the_pupil(scene, limit)
     along = np.linspace(0.0, 1.0, 33)
     border = np.concatenate([[(t, 0.0), (t, 1.0), (0.0, t), (1.0, t)] for t in along]) * scene.camera.shape[::-1]
     rays = scene.camera.rays(border)
     points = scene.surface.intersect(scene.eye, rays.origins, rays.directions)
-    limit = scene.eye.radius * math.pi / 2.0
     if np.any(np.isnan(points)):
         return limit
     return float(min(1.02 * np.max(np.abs(to_arc(scene, points))) + scene.surface.relief, limit))
+
+
+def _through_the_pupil(scene: Scene, limit: float) -> float:
+    """`arc_extent` where the pupil cuts the view, at most `limit` [mm]; a tenth more for what lies between the rays."""
+    places = np.stack(np.meshgrid(np.linspace(0.0, 1.0, 65), np.linspace(0.0, 1.0, 65)), axis=-1).reshape(-1, 2)
+    rays = scene.camera.rays(places * scene.camera.shape[::-1])
+    points = scene.surface.intersect(scene.eye, rays.origins, rays.directions)
+    seen = points[np.isfinite(points[:, 0])]
+    return float(min(1.1 * np.max(np.abs(to_arc(scene, seen))) + scene.surface.relief, limit))
 
 
 def to_arc(scene: Scene, points: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -22,18 +22,22 @@ def rim_pixels(scene: Scene, pose: Pose, spotlight: int) -> NDArray[np.uint32]:
     """
     (height, width), b = scene.camera.shape, scene.beam.half_angle
     rim = scene.camera.project(scene.outline(pose, spotlight))
-    across = float(np.linalg.norm(rim - np.roll(rim, len(rim) // 2, axis=0), axis=-1).min())
+    diameters = np.linalg.norm(rim - np.roll(rim, len(rim) // 2, axis=0), axis=-1)
+    if not np.any(np.isfinite(diameters)):  # through the eye's optics no ray may meet it
+        return np.zeros(0, np.uint32)
+    across = float(np.nanmin(diameters))
     pixel = 2.0 * b / across  # the angle that a pixel sees where the patch is foreshortened most
     angles = np.arange(b + (1.0 - _STEP / 2.0) * pixel, 0.0, -_STEP * pixel)
     ahead, behind = (scene.beam.intensity(np.cos(angles + k * pixel / 2.0)) for k in (1.0, -1.0))
     steep = angles[np.abs(ahead - behind) > STEEP]
-    around = int(np.linalg.norm(rim - np.roll(rim, 1, axis=0), axis=-1).sum()) + 4
+    around = int(np.nansum(np.linalg.norm(rim - np.roll(rim, 1, axis=0), axis=-1))) + 4
     found = []
     for angle in steep:
         cone = scene.model_copy(update={"beam": HardBeam(half_angle=float(angle))})
         points = scene.camera.project(cone.outline(pose, spotlight, points=around))
         steps = np.arange(0.0, 1.0, _STEP)[:, None, None]
-        column, row = np.floor(points + steps * (np.roll(points, -1, axis=0) - points)).astype(int).reshape(-1, 2).T
+        places = (points + steps * (np.roll(points, -1, axis=0) - points)).reshape(-1, 2)
+        column, row = np.floor(places[np.isfinite(places[:, 0])]).astype(int).T
         inside = (column >= 0) & (column < width) & (row >= 0) & (row < height)
         found.append(np.unique(row[inside] * width + column[inside]))
     return np.unique(np.concatenate([np.zeros(0, int), *found])).astype(np.uint32)

@@ -12,9 +12,10 @@ from typing import assert_never
 
 import numpy as np
 
-from conespot.scene import Scene, fundus
+from conespot.scene import Scene, fundus, media
 from conespot.scene.emva import Emva
 from conespot.scene.illumination import Light
+from conespot.scene.optics import Optics
 from conespot.scene.sensor import Linear, Recorded, Srgb8
 from conespot.scene.spectrum import Curve
 
@@ -48,10 +49,13 @@ def has_water(scene: Scene) -> bool:
     return scene.retina.water
 
 
-def channels(scene: Scene, light: Light, responses: dict[str, Curve] | None = None) -> tuple[Channel, ...]:
+def channels(
+    scene: Scene, light: Light, responses: dict[str, Curve] | None = None, *, from_outside: bool = False
+) -> tuple[Channel, ...]:
     """The channels of the scene's sensor (or of `responses`) under a light, in the order of their names' table.
 
-    `linear` and a grey `srgb8` have one with response 1: radiance integrated over wavelength.
+    `linear` and a grey `srgb8` have one with response 1: radiance integrated over wavelength. Where the camera looks
+    through the eye's optics, its media are in the film: once, and of a light `from_outside` twice.
     """
     spectrum = light.spectrum
     wide = Curve(np.array([300.0, 1100.0]), np.ones(2))
@@ -60,8 +64,22 @@ def channels(scene: Scene, light: Light, responses: dict[str, Curve] | None = No
     found = []
     for name, response in (responses or {"radiance": wide}).items():
         seen = spectrum if responses is None else spectrum.times(response)
-        found.append(Channel(name, response, seen.times(_WATER) if has_water(scene) else seen))
+        film = seen.times(_WATER) if has_water(scene) else seen
+        if scene.camera.optics is not None:
+            film = film.times(_media(scene.camera.optics, 2 if from_outside else 1))
+        found.append(Channel(name, response, film))
     return tuple(found)
+
+
+def _media(optics: Optics, passes: int) -> Curve:
+    """What becomes of radiance on its way out of the eye, its light having passed the media so many times.
+
+    Radiance over the square of the index stays the same through any optics without loss (Nicodemus, Am. J. Phys.
+    31:368, 1963): in air it is that in the vitreous over n^2, whose light goes into a wider cone.
+    """
+    x = _WATER.wavelengths
+    age = optics.age if optics.lens == "phakic" else None
+    return Curve(x, media.transmission(x, age) ** passes / optics.index("vitreous", x) ** 2)
 
 
 def emission(scene: Scene, light: Light, total: float, water_mm: float) -> dict[str, object]:

@@ -59,7 +59,7 @@ class Stage:
                 " Mitsuba, and the scalar one is in use; `campaign doctor` says why"
             )
         self._reflectance = Reflectance(scene.retina)
-        channels = spectral.channels(scene, light, responses)
+        channels = spectral.channels(scene, light, responses, from_outside=like is not None)
         self.channels = len(channels)
         apart = self._reflectance.is_spectral_map and not chosen.vectorized
         # a channel whose filter blocks all of the light stays black; Mitsuba could not sample a wavelength for it
@@ -72,7 +72,8 @@ class Stage:
         self.transport: wavefront.Transport = "path" if walls is not None else "direct"
         if self._vectorized and walls is None and scene.surface.is_sphere and not shapes:
             self.transport = "unblocked"
-        near = scene.camera.height / 1000.0 if self.transport == "direct" else globe.near_plane(scene)
+        begin_inside = self.transport != "direct" and scene.camera.optics is None
+        near = globe.near_plane(scene) if begin_inside else scene.camera.height / 1000.0
         self._rays = RayGenerator(scene.camera, near) if self._vectorized else None
         for group in [[channels[i]] for i in self._seen] if apart else [[channels[i] for i in self._seen]]:
             if not group:

@@ -61,9 +61,12 @@ def trace(
     y = mi.Float(pixel // width) + (mi.Float(row) + random.next_float32()) * (columns / samples)
     # a ray carries four wavelengths, each a quarter of the range from the next: cells of a quarter tell them all apart.
     # Cells of area and of wavelength are paired at random, or colours would lie across the pixel.
-    wavelength = (mi.Float(mi.permute_kensler(k, samples, first)) + random.next_float32()) / (4 * samples)
+    cells = samples if camera.disperses else 4 * samples
+    wavelength = (mi.Float(mi.permute_kensler(k, samples, first)) + random.next_float32()) / cells
     wavelengths, weight = sensor.sample_wavelengths(dr.zeros(mi.SurfaceInteraction3f), wavelength)
-    ray = camera.rays(x, y, wavelengths)
+    if camera.disperses:  # light of one wavelength goes this way, so cells of the whole range tell them apart
+        wavelengths, weight = mi.Spectrum(wavelengths[0]), mi.Spectrum(weight[0])
+    ray, seen = camera.rays(x, y, wavelengths)
     match transport:
         case "unblocked":
             light, met = _unblocked(loaded, ray)
@@ -76,6 +79,7 @@ def trace(
             light, met, _ = paths.sample(loaded, bounces, ray)
         case _:
             assert_never(transport)
+    met &= seen
     if grey is None:
         values = film.prepare_sample(weight * light, ray.wavelengths, channels, 1.0, 1.0, met)[:-1]
     else:

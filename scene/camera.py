@@ -4,18 +4,20 @@ from __future__ import annotations
 
 import math
 import re
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from pydantic import BeforeValidator, Field, ValidationInfo, model_validator
+from pydantic import BeforeValidator, Field, PrivateAttr, ValidationInfo, model_validator
 
 from conespot.scene.calibration_file import intrinsics
 from conespot.scene.distortion import Distortion
 from conespot.scene.model import Model
+from conespot.scene.optics import SODIUM, AnyOptics
 from conespot.scene.quantity import Angle, Length, parse_quantity
+from conespot.scene.rays import Rays
+from conespot.scene.refracted import found, refracted
 
 Array = NDArray[np.float64]
 _STILL = np.zeros(3)
@@ -43,21 +45,6 @@ def _pixels(value: object) -> float:
 
 _Side = Annotated[int, Field(ge=_FEWEST, le=_MOST)]
 _Pixels = Annotated[float, BeforeValidator(_pixels)]
-
-
-@dataclass(frozen=True, eq=False)
-class Rays:
-    """What pixels see along, and how that changes from pixel to pixel: x to the right, y down.
-
-    Where all rays have the same, an array is one vector `[3]`, which goes with the others as numpy broadcasts.
-    """
-
-    origins: Array  #: `[..., 3]` [mm]
-    directions: Array  #: unit, away from the camera `[..., 3]`
-    origins_by_x: Array  #: `[..., 3]` [mm/px]
-    origins_by_y: Array  #: `[..., 3]` [mm/px]
-    directions_by_x: Array  #: across the directions `[..., 3]` [1/px]
-    directions_by_y: Array  #: across the directions `[..., 3]` [1/px]
 
 
 class Camera(Model):
@@ -91,7 +78,10 @@ class Camera(Model):
     tilt: Angle = Field(0.0, ge=0.0, le=math.pi / 3.0)
     azimuth: Angle = 0.0
     roll: Angle = 0.0
-    look_at: tuple[Length, Length, Length] = (0.0, 0.0, 0.0)  #: where the axis goes through [mm]
+    #: where the axis goes through, were there no optics [mm]
+    look_at: tuple[Length, Length, Length] = (0.0, 0.0, 0.0)
+    optics: AnyOptics = None  #: of the eye that it looks into; with none the retina lies in the open
+    _wavelength: float = PrivateAttr(SODIUM)
 
     @model_validator(mode="before")
     @classmethod
@@ -135,8 +125,8 @@ class Camera(Model):
 
     @property
     def is_plain(self) -> bool:
-        """Whether it is the paper's: straight above the pole, square pixels, no distortion, its axis in the middle."""
-        moved = self.tilt != 0.0 or self.roll != 0.0 or self.look_at != (0.0, 0.0, 0.0)
+        """Whether it is the paper's: in air straight above the pole, square pixels, no distortion, a centred axis."""
+        moved = self.tilt != 0.0 or self.roll != 0.0 or self.look_at != (0.0, 0.0, 0.0) or self.optics is not None
         return not moved and self.pixel_aspect == 1.0 and self.principal_point is None and self.distortion is None
 
     @property
@@ -188,7 +178,18 @@ class Camera(Model):
         >>> round(Camera().pixel_pitch, 5)
         0.00264
         """
+        if self.optics is not None:
+            seen = self._refracted(self.project(np.zeros(3)))
+            # as far from where the ray enters the vitreous as the pole is
+            moved = seen.origins_by_x + np.linalg.norm(seen.origins) * seen.directions_by_x
+            return float(np.linalg.norm(moved))
         return self.height / self.focal_length_px
+
+    def seeing(self, wavelength: float) -> Camera:
+        """The same camera, whose `rays` and `project` are those of a wavelength [nm] where none is named."""
+        camera = self.model_copy()
+        camera._wavelength = wavelength
+        return camera
 
     def with_columns(self, columns: int) -> Camera:
         """The same view with that many pixels along a row, and as many rows as keep its shape [px]."""
@@ -200,8 +201,29 @@ class Camera(Model):
             update["principal_point"] = tuple(scale * c for c in self.principal_point)
         return self.model_copy(update=update)
 
-    def rays(self, pixels: ArrayLike) -> Rays:
-        """The rays of pixel coordinates `[..., 2]` [px], in the frame or beyond; NaN where the lens puts nothing."""
+    def rays(self, pixels: ArrayLike, wavelength: float | None = None) -> Rays:
+        """The rays of pixel coordinates `[..., 2]` [px], in the frame or beyond; NaN where the lens puts nothing.
+
+        Through the eye's optics they are those in the vitreous, of a `wavelength` [nm] or the camera's own, and NaN
+        where the iris stops them: such a pixel is black.
+        """
+        if self.optics is None:
+            return self._in_air(pixels)
+        return refracted(self.optics, self._in_air(pixels), wavelength or self._wavelength)
+
+    def shows(self, pixels: ArrayLike) -> NDArray[np.bool_]:
+        """Which pixel coordinates `[..., 2]` [px] lie in the frame, and are not black for the iris: `[...]`."""
+        q = np.asarray(pixels, float)
+        inside = np.all((q >= 0.0) & (q <= self.shape[::-1]), axis=-1)
+        return inside if self.optics is None else inside & np.isfinite(self.rays(q).directions[..., 0])
+
+    def _refracted(self, pixels: ArrayLike) -> Rays:
+        """The rays as if the iris let them through, so that an outline goes on behind it."""
+        assert self.optics is not None
+        return refracted(self.optics, self._in_air(pixels), self._wavelength, stopped=False)
+
+    def _in_air(self, pixels: ArrayLike) -> Rays:
+        """`rays` of the camera alone."""
         q = np.asarray(pixels, float)
         x, y = self.on_plane(q)
         lens: tuple[float | Array, float | Array, float | Array] = (
@@ -230,11 +252,18 @@ class Camera(Model):
     def project(self, points: ArrayLike) -> Array:
         """Pixel coordinates `[..., 2]` [px] of points `[..., 3]` [mm], the inverse of `rays`.
 
-        In the frame or beyond it; NaN for what no ray meets, which is all beside and above the pinhole.
+        In the frame or beyond it, and behind the iris as far as the eye's optics go on there, so that an outline does
+        not end at the pupil (`shows` tells). NaN for what no ray meets: all beside and above the pinhole, or the lens.
 
         >>> Camera().project([0.0, 0.0, 120.0]).tolist()
         [nan, nan]
         """
+        if self.optics is None:
+            return self._from_air(points)
+        return found(self._refracted, np.asarray(points, float), self._from_air([0.0, 0.0, self.optics.iris]))
+
+    def _from_air(self, points: ArrayLike) -> Array:
+        """`project` of the camera alone."""
         p = np.asarray(points, float)
         if self.tilt or self.roll or self.look_at != (0.0, 0.0, 0.0):
             p = (p - self.centre) @ self.axes.T

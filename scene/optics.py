@@ -23,8 +23,8 @@ from conespot.scene.refraction import Interface, Root, Vector, through, to_plane
 _CONTACT = 1.0
 #: intraocular lens: front and back radius, thickness, and how far behind the front of the cornea it stands [mm]
 _IMPLANT = 21.557, -22.0, 0.593, 4.70
-#: [nm], at which Le Grand's indices stand
-_SODIUM = 589.3
+#: [nm], at which Le Grand's indices stand, and at which a camera sees that has not been told another
+SODIUM = 589.3
 
 
 @dataclass(frozen=True)
@@ -181,7 +181,7 @@ class Optics(Model):
         """Refractive index of a medium at wavelengths [nm]: this eye's, with the dispersion of Navarro's."""
         n = media.index(medium, wavelength)
         own = self.model.indices.get(medium)
-        return n if own is None else n + (own - media.index(medium, _SODIUM))
+        return n if own is None else n + (own - media.index(medium, SODIUM))
 
     def enter(
         self, origin: Vector, direction: Vector, wavelength: Numbers, sqrt: Root

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field, model_validator
 
+from conespot.scene import fundus
 from conespot.scene.beam import Beam, CyclesBeam
 from conespot.scene.camera import Camera
 from conespot.scene.document import Document, find_document, is_file, merge, read_document
@@ -19,11 +20,16 @@ from conespot.scene.illumination import Ambient, FlatBand, Illumination
 from conespot.scene.model import Model, unknown_name
 from conespot.scene.pose import Pose, cone_rays
 from conespot.scene.power import Power
+from conespot.scene.quantity import format_quantity
 from conespot.scene.retina import PhotoRetina, Retina
 from conespot.scene.sensor import Sensor, Srgb8
+from conespot.scene.spectrum import Curve
 from conespot.scene.spotlights import RIGS, Instrument, Spotlights, spotlight_axes
 from conespot.scene.surface import AnySurface, Surface
 from conespot.scene.text_file import at_home
+
+#: by which a scene's retina may differ from that of the model eye that the camera looks into [mm]
+_SAME_RETINA = 0.01
 
 
 class Scene(Model):
@@ -63,7 +69,31 @@ class Scene(Model):
             if camera.centre[2] <= 2.0 * radius * max(1.0, surface.semi_axes[2]):
                 raise ValueError("camera.height must put the camera above the eye (more than twice eye.radius)")
             if not camera.is_plain and not _sees(camera, self.eye):
-                raise ValueError("camera: no ray of it meets the retina; check look_at, tilt and principal_point")
+                checks = "look_at, tilt, principal_point and the pupil of optics"
+                raise ValueError(f"camera: no ray of it meets the retina; check {checks}")
+        return self
+
+    @model_validator(mode="after")
+    def _looks_into_its_own_eye(self) -> Scene:
+        optics, cameras = self.camera.optics, self.cameras
+        if any(camera.optics != optics for camera in cameras.values()):
+            raise ValueError("cameras: all look into one eye; give each the same optics")
+        if optics is None:
+            return self
+        own = np.array(optics.model.retina)
+        if np.abs(self.eye.radius * np.array(self.surface.semi_axes) - own).max() > _SAME_RETINA:
+            shape = " x ".join(f"{axis:.6g}" for axis in own)
+            ratios = ", ".join(f"{ratio:.6g}" for ratio in own / own[2])
+            raise ValueError(
+                f"camera.optics: the retina of the {optics.eye} eye has semi-axes of {shape} mm;"
+                f" write eye: {{radius: {format_quantity(own[2], 'length')}}} and surface: {{semi_axes: [{ratios}]}}"
+            )
+        if any(camera.centre[2] <= optics.top for camera in (self.camera, *cameras.values())):
+            raise ValueError("camera.height must put the camera above the eye's optics")
+        # a scene is frozen once it is validated: its cameras see at the light's own wavelength
+        wavelength = self.effective_wavelength
+        self.__dict__["camera"] = self.camera.seeing(wavelength)
+        self.__dict__["cameras"] = {name: camera.seeing(wavelength) for name, camera in cameras.items()}
         return self
 
     @model_validator(mode="after")
@@ -83,6 +113,25 @@ class Scene(Model):
     def through(self, name: str) -> Scene:
         """The scene as another of its `cameras` sees it at the same instant. Raises KeyError for no such camera."""
         return self.model_copy(update={"camera": self.cameras[name]})
+
+    @property
+    def effective_wavelength(self) -> float:
+        """Centroid of the spotlights' light as the sensor sees it, over all its channels [nm].
+
+        What the camera's rays and a localizer's forward model see at, where every wavelength goes its own way. From a
+        living fundus light comes in the perifovea's colour.
+        """
+        light = self.illumination.spectrum
+        if self.retina.is_spectral:
+            x = np.arange(300.0, 1101.0)
+            light = light.times(Curve(x, fundus.reflectance(x, fundus.SITES["perifovea"])))
+        responses = self.sensor.responses
+        seen = [light] if responses is None else [light.times(response) for response in responses.values()]
+        weights = np.array([curve.integral() for curve in seen])
+        if not weights.sum() > 0.0:
+            return light.mean_wavelength
+        means = [curve.mean_wavelength if weight > 0.0 else 0.0 for curve, weight in zip(seen, weights, strict=True)]
+        return float(weights @ means / weights.sum())
 
     def pose(self, apex: NDArray[np.float64]) -> Pose:
         """The pose of the tip at `apex` `[3]` [mm]. Raises ValueError if it is outside the eye or in its wall."""
@@ -114,7 +163,7 @@ class Scene(Model):
 def _sees(camera: Camera, eye: Eye) -> bool:
     """Whether some of the camera's rays meet the eye."""
     rows, columns = camera.shape
-    x, y = np.meshgrid(np.linspace(0.0, columns, 17), np.linspace(0.0, rows, 17))
+    x, y = np.meshgrid(np.linspace(0.0, columns, 65), np.linspace(0.0, rows, 65))
     rays = camera.rays(np.stack([x, y], axis=-1))
     return bool(np.any(np.isfinite(eye.intersect(rays.origins, rays.directions))))
 

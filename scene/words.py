@@ -7,9 +7,15 @@ from conespot.scene.scene import Scene
 
 
 def assumed(scene: Scene) -> dict[str, str]:
-    """Radius of the eye, edge of the beam, power convention, transfer of the sensor, and surface, in words by name."""
+    """Radius of the eye, edge of the beam, power convention, transfer of the sensor, and surface, in words by name.
+
+    The radius comes with the optics that the eye is seen through, if there are any.
+    """
+    radius = format_quantity(scene.eye.radius, "length")
+    if scene.camera.optics is not None:
+        radius += f" seen through {scene.camera.optics.words}, localized at {scene.effective_wavelength:.0f} nm"
     return {
-        "radius": format_quantity(scene.eye.radius, "length"),
+        "radius": radius,
         "edge": scene.beam.words,
         "power_convention": scene.power.words,
         "transfer": scene.sensor.words,

@@ -94,7 +94,8 @@ def outline(estimate: Estimate, spotlight: int, points: int = _POINTS) -> Array:
 
 
 def _inside(pixels: Array, scene: Scene) -> NDArray[np.bool_]:
-    return np.asarray(np.all((pixels > 0.0) & (pixels < scene.camera.shape[::-1]), axis=1))
+    within = np.all((pixels > 0.0) & (pixels < scene.camera.shape[::-1]), axis=1)
+    return np.asarray(within & scene.camera.shows(pixels))
 
 
 def outlines(estimate: Estimate, points: int = _POINTS) -> Array:
@@ -145,7 +146,7 @@ def log_albedo(reference: Reference, scene: Scene, at: Window, noise: NoiseModel
     Smoothed as far as its noise exceeds the retina's own detail.
     """
     irradiance = ambient_irradiance(look(scene, at.pixels, at.side), scene)
-    irradiance = np.maximum(irradiance.reshape(at.height, at.width), 1e-3)
+    irradiance = np.fmax(irradiance.reshape(at.height, at.width), 1e-3)  # also where no retina is seen
     found = []
     for shown in at.light(Frame(reference.pixels, scene.sensor))[0].transpose(2, 0, 1):
         plane = at.binned(np.ascontiguousarray(shown))
@@ -181,10 +182,10 @@ class Bins:
                 corners = (points - [at.column, at.row]) / at.side - 0.5
                 cv2.fillPoly(mask, [np.round(corners).astype(np.int32)], 1)
         reach = 2 * VIEW.reach + 1
-        self.lit = np.flatnonzero(cv2.dilate(mask, np.ones((reach, reach), np.uint8)))
         sight = look(scene, pixels, at.side)
         ambient = ambient_irradiance(sight, scene)
         self.seen = np.isfinite(ambient)
+        self.lit = np.flatnonzero(self.seen & (cv2.dilate(mask, np.ones((reach, reach), np.uint8)).ravel() > 0))
         self.ambient = np.where(self.seen, ambient, 1.0)
         self.seen &= ~covered(pixels, estimate.pose, scene, side=at.side)
         if len(scene.spotlights) > 1:
@@ -206,7 +207,8 @@ def spotlight_irradiance(
     `sight` is what the bins of `side` px at `pixels` `[N, 2]` see of the nominal surface.
     """
     free = knowns.free
-    seen = look(estimate.scene, pixels, side) if {"eye_radius", "camera_height"} & set(free) else sight
+    scene_moves = bool({"eye_radius", "camera_height"} & set(free))
+    seen = look(estimate.scene, pixels, side) if scene_moves else sight
     changes = estimate.beam_changes(free)
     here = light(seen, estimate.pose, estimate.scene, estimate.profile, pose_size=estimate.pose_size, changes=changes)
     rows = [here.jacobian]
@@ -216,4 +218,7 @@ def spotlight_irradiance(
             for step in (_STEP, -_STEP)
         )
         rows.append(light_by_surface(here, seen, estimate.pose, (plus, minus), _STEP)[None])
-    return here.value, np.concatenate(rows)
+    jacobian = np.concatenate(rows)
+    if scene_moves:  # and the iris before some of the bins
+        return np.nan_to_num(here.value), np.nan_to_num(jacobian)
+    return here.value, jacobian

@@ -88,7 +88,7 @@ def cramer_rao(
     rows = [gain * here.jacobian[:size]]
     rows.append(gain * here.jacobian[size:])
     rows += [gain * _difference(scene, pose, pixels, name)[None] for name in knowns.free if name not in BEAM]
-    nuisance = np.stack([gain * here.value, np.ones(len(pixels))])
+    nuisance = np.stack([gain * here.value, np.ones(here.value.size)])
     jacobian = np.concatenate([*rows, nuisance])
     information = (jacobian / (gain * here.value + sensor.background**2)) @ jacobian.T
     count = size + len(knowns.free)

@@ -41,7 +41,7 @@ def test_the_renderers_own_rays_are_the_cameras(camera):
     if not kernel_in_use.vectorized:
         pytest.skip("the scalar variant has Mitsuba's own sensor")
     pixels = np.random.default_rng(0).uniform(0.0, camera.shape[::-1], (1000, 2)).astype(np.float32).astype(float)
-    cast = RayGenerator(camera, 90.0).rays(*(mi.Float(part) for part in pixels.T), dr.zeros(mi.Spectrum))
+    cast, _ = RayGenerator(camera, 90.0).rays(*(mi.Float(part) for part in pixels.T), dr.zeros(mi.Spectrum))
     rays = camera.rays(pixels)
     np.testing.assert_allclose(np.array(cast.d).T, rays.directions, rtol=0.0, atol=2e-7)
     offset = np.array(cast.o).T - rays.origins

@@ -37,7 +37,7 @@ def test_the_renderers_rays_are_those_of_a_real_camera(lens):
     mi, dr, _ = kernel.load()
     camera = REAL.model_copy(update={"distortion": lens})
     pixels = np.random.default_rng(0).uniform(0.0, camera.shape[::-1], (1000, 2)).astype(np.float32).astype(float)
-    cast = RayGenerator(camera, 90.0).rays(*(mi.Float(part) for part in pixels.T), dr.zeros(mi.Spectrum))
+    cast, _ = RayGenerator(camera, 90.0).rays(*(mi.Float(part) for part in pixels.T), dr.zeros(mi.Spectrum))
     rays = camera.rays(pixels)
     np.testing.assert_allclose(np.array(cast.d).T, rays.directions, rtol=0.0, atol=1e-6)
     np.testing.assert_allclose(camera.project(np.array(cast.o).T.astype(float)), pixels, rtol=0.0, atol=0.01)
