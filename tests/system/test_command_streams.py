@@ -45,7 +45,13 @@ STREAMS = {
 }
 
 
-@pytest.mark.parametrize("line", [pytest.param(line, id=name) for name, line in STREAMS.items()])
+@pytest.mark.parametrize(
+    "line",
+    [
+        pytest.param(line, id=name, marks=pytest.mark.slow if i else ())
+        for i, (name, line) in enumerate(STREAMS.items())
+    ],
+)
 def test_a_run_is_done_whoever_listens(folder, line):
     done = shell(line, folder)
     assert done.returncode == 0, done.stderr
