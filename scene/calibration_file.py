@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from conespot.scene.distortion import COEFFICIENTS
+from conespot.scene.text_file import read_text
 
 if TYPE_CHECKING:
     from cv2 import FileNode, FileStorage
@@ -45,10 +46,11 @@ def intrinsics(path: Path, sensor_width: float) -> dict[str, Any]:
     """
     import cv2
 
+    text = read_text(path, _MAX_BYTES, "calibration file")
     level = cv2.utils.logging.getLogLevel()
     cv2.utils.logging.setLogLevel(cv2.utils.logging.LOG_LEVEL_SILENT)  # OpenCV would complain on stderr too
     try:
-        storage = cv2.FileStorage(_text(path), cv2.FILE_STORAGE_READ | cv2.FILE_STORAGE_MEMORY)
+        storage = cv2.FileStorage(text, cv2.FILE_STORAGE_READ | cv2.FILE_STORAGE_MEMORY)
         columns, rows = _size(storage, path)
         matrix = _matrix(storage, path)
         distortion = _coefficients(storage, path)
@@ -70,15 +72,6 @@ def intrinsics(path: Path, sensor_width: float) -> dict[str, Any]:
     if any(distortion):
         found["distortion"] = dict(zip(COEFFICIENTS, distortion, strict=False))
     return found
-
-
-def _text(path: Path) -> str:
-    try:
-        if path.stat().st_size > _MAX_BYTES:
-            raise ValueError(f"{path}: larger than {_MAX_BYTES} bytes, not a calibration file")
-        return path.read_text("utf-8-sig")
-    except (OSError, UnicodeDecodeError) as error:
-        raise ValueError(f"{path}: cannot be read as a calibration file ({error})") from None
 
 
 def _node(storage: FileStorage, names: tuple[str, ...]) -> tuple[str, FileNode] | None:

@@ -88,7 +88,9 @@ class Camera(Model):
     def _calibrated(cls, data: Any, info: ValidationInfo) -> Any:
         if not (isinstance(data, dict) and "calibration" in data):
             return data
-        path = Path(info.context["folder"] if info.context else ".") / str(data["calibration"])
+        if not isinstance(data["calibration"], str):
+            raise ValueError(f"calibration: name a file of OpenCV's, got {data['calibration']!r}")
+        path = Path(info.context["folder"] if info.context else ".") / data["calibration"]
         found = intrinsics(path, parse_quantity(data.get("sensor_width", 36.0), "length"))
         given = [key for key in found if key in data]
         if given:

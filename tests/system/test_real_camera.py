@@ -1,6 +1,9 @@
 """Frames of a camera as a microscope has it: oblong, aslant, off centre and distorted."""
 
 import math
+import os
+import subprocess
+import sys
 
 import cv2
 import numpy as np
@@ -56,7 +59,9 @@ def chords(outline, lines, axis):
 
 
 @needs_jit
-@pytest.mark.parametrize("interreflection", [None, Globe(bounces=1)], ids=["direct", "path"])
+@pytest.mark.parametrize(
+    "interreflection", [None, pytest.param(Globe(bounces=1), marks=pytest.mark.slow)], ids=["direct", "path"]
+)
 def test_the_edge_of_a_patch_lies_where_the_closed_forms_outline_is_projected(interreflection):
     """A hard beam on a nearly black retina, its radiance over the closed form's: rows and columns against the outline.
 
@@ -83,3 +88,18 @@ def test_the_edge_of_a_patch_lies_where_the_closed_forms_outline_is_projected(in
         off = seen.sum(axis=axis) - chords(outline, lines, axis)
         assert math.sqrt(np.mean(off**2)) < 0.06
         assert abs(np.mean(off)) < 0.02
+
+
+def test_without_a_jit_variant_a_camera_that_is_no_plain_pinhole_is_refused_in_a_sentence():
+    """The scalar variant in a process of its own: an oblong frame straight from above renders, one aslant does not."""
+    code = """
+from conespot.render import Renderer
+from conespot.scene import Camera, Scene
+from conespot.scene.retina import UniformRetina
+for camera in (Camera(resolution=(32, 16)), Camera(resolution=32, tilt=0.1)):
+    print(Renderer(Scene(camera=camera, retina=UniformRetina()), samples=1).background().shape)
+"""
+    environment = {**os.environ, "CONESPOT_VARIANT": "scalar_spectral", "CONESPOT_CACHE": "off"}
+    done = subprocess.run([sys.executable, "-c", code], env=environment, capture_output=True, text=True, timeout=300)
+    assert done.stdout == "(16, 32, 1)\n"
+    assert done.stderr.splitlines()[-1].startswith("conespot.render.kernel.KernelError: a camera that is aslant")

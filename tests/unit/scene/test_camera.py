@@ -142,7 +142,7 @@ def test_what_a_lens_that_folds_outside_the_frame_would_bring_back_is_not_seen()
         ("tilt: 95 deg", "less than or equal to 60"),
         ("look_at: [200 mm, 0 mm, 0 mm]", "no ray of it meets the retina"),
         ("{height: 30 mm, tilt: 50 deg}", "must put the camera above the eye"),
-        ("calibration: nowhere.yml", "cannot be read as a calibration file"),
+        ("calibration: nowhere.yml", "nowhere.yml: cannot be read: No such file"),
         ("{calibration: cal.yml, resolution: 500}", "resolution would also come from calibration"),
     ],
 )
