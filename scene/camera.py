@@ -228,23 +228,24 @@ class Camera(Model):
         """`rays` of the camera alone."""
         q = np.asarray(pixels, float)
         x, y = self.on_plane(q)
-        lens: tuple[float | Array, float | Array, float | Array] = (
-            1.0,
-            0.0,
-            1.0,
-        )  # how the undistorted plane changes with the distorted one: xx, xy, yy
         if self.distortion is not None:
             x, y = self.distortion.undistorted(x, y)
-            xx, xy, yy = self.distortion.jacobian(x, y)
-            per = 1.0 / (xx * yy - xy * xy)
-            lens = per * yy, -per * xy, per * xx
         d = np.empty((3, *q.shape[:-1]))  # components first: three times as fast as last
         d[0], d[1], d[2] = x, 0.0 - y, -1.0  # no negative zero
         length = np.sqrt(d[0] * d[0] + d[1] * d[1] + 1.0)
         d /= length
-        f = self.focal_length_px
-        by_x = _across(d, 1.0 / (f * length), lens[0], -lens[1])
-        by_y = _across(d, 1.0 / (f * self.pixel_aspect * length), lens[1], -lens[2])
+        per_x = 1.0 / (self.focal_length_px * length)
+        per_y = per_x if self.pixel_aspect == 1.0 else per_x / self.pixel_aspect
+        # of D / |D| with D' = (1, 0, 0) / f, and (0, -1, 0) / f down the image
+        by_x, by_y = -(per_x * d[0]) * d, (per_y * d[1]) * d
+        by_x[0] += per_x
+        by_y[1] -= per_y
+        if self.distortion is not None:
+            # from changes on the plane to changes before the lens, by the inverse of its Jacobian
+            xx, xy, yy = self.distortion.jacobian(x, y)
+            per = 1.0 / (xx * yy - xy * xy)
+            aspect = self.pixel_aspect
+            by_x, by_y = per * (yy * by_x - xy * aspect * by_y), per * (xx * by_y - xy / aspect * by_x)
         last = (*range(1, d.ndim), 0)
         seen = [part.transpose(last) for part in (d, by_x, by_y)]
         if self.tilt or self.roll:
@@ -289,11 +290,3 @@ class Camera(Model):
 def _about_z(angle: float) -> Array:
     c, s = math.cos(angle), math.sin(angle)
     return np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
-
-
-def _across(d: Array, per: Array, x: float | Array, y: float | Array) -> Array:
-    """How the unit directions `[3, ...]` change where the ray's end moves by (x, y, 0) for each `per` of its length."""
-    moved = -(per * (x * d[0] + y * d[1])) * d
-    moved[0] += per * x
-    moved[1] += per * y
-    return moved
