@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from scipy.stats import t
 
-from conespot.render import Exposure, Renderer
+from conespot.render import Exposure, Renderer, kernel, wavefront
 from conespot.render.exposure import encode
 from conespot.render.reflectance import Reflectance
 from conespot.scene import Camera, Scene
@@ -22,10 +22,22 @@ def scene_of(**changes):
     return Scene(**{"camera": Camera(resolution=400), "retina": UniformRetina(albedo=0.1), **changes})
 
 
+def test_a_sphere_met_in_closed_form_is_what_embree_meets(monkeypatch):
+    """The same tile with the scene asked what each ray meets and whether anything shades it; to the bit."""
+    if not kernel.load()[2].vectorized:
+        pytest.skip("the scalar variant has a loop of its own")
+    scene = scene_of(retina=PhotoRetina())
+    pose = scene.pose(np.array([0.8, 0.4, 4.0]))
+    tile = Renderer(scene).tile(pose, 0, seed=1)
+    monkeypatch.setattr(wavefront, "_unblocked", wavefront._direct)
+    np.testing.assert_array_equal(Renderer(scene).tile(pose, 0, seed=1).radiance, tile.radiance)
+    assert tile.radiance.max() > 0.0
+
+
 @pytest.mark.slow
 def test_sum_of_tiles_times_power_is_one_render_at_that_power():
     """z-test per pixel, Sidak-corrected: the tiled frame against brute force with all lights in one scene of a mesh."""
-    from conespot.render import emitters, kernel
+    from conespot.render import emitters
     from conespot.render.retina_mesh import retina_mesh
 
     scene = scene_of(spotlights=RIGS["triple"], retina=PhotoRetina(), camera=Camera(resolution=300))

@@ -121,6 +121,14 @@ def test_it_can_be_switched_off(place, monkeypatch, value):
     assert kept.clear() == 0
 
 
+def test_what_somebody_holds_is_given_again_without_a_cache_too(monkeypatch):
+    monkeypatch.setenv(kept.SWITCH, "off")
+    held = kept.kept("a", SHAPE, image)
+    assert kept.kept("a", SHAPE, never) is held
+    del held
+    np.testing.assert_array_equal(kept.kept("a", SHAPE, lambda: image(1)), image(1))
+
+
 def test_a_cache_that_cannot_be_written_is_none(tmp_path, monkeypatch):
     (tmp_path / "file").write_text("")
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "file"))

@@ -1,5 +1,6 @@
 """Figures 8 to 11: what is drawn is what is stored, the same bytes every time, failures included."""
 
+import os
 import warnings
 import xml.etree.ElementTree as ET
 
@@ -166,6 +167,26 @@ def test_the_same_rows_give_the_same_bytes(tmp_path, plan, make_rows):
     svg = next(data for data in written[0] if b"<svg" in data)
     assert b"<dc:date>" not in svg
     assert ET.fromstring(svg).tag.endswith("svg")
+
+
+@pytest.mark.skipif(not hasattr(os, "sched_getaffinity"), reason="figures are drawn on one core where nothing forks")
+def test_figures_are_the_same_on_one_core_and_on_several_of_which_one_fails(tmp_path, plan, make_rows, monkeypatch):
+    drawings, _ = plan(make_rows(poses=6, powers=(0.1, 1.0)))
+    drawn, here = figures._draw, os.getpid()
+
+    def killed(*share):
+        if os.getpid() != here:
+            os._exit(1)
+        drawn(*share)
+
+    written = []
+    for name, cores, draw in (("one", 1, drawn), ("three", 3, drawn), ("failing", 3, killed)):
+        (tmp_path / name).mkdir()
+        monkeypatch.setattr(os, "sched_getaffinity", lambda _, cores=cores: set(range(cores)))
+        monkeypatch.setattr(figures, "_draw", draw)
+        written.append([path.read_bytes() for path in draw_figures(drawings[:3], tmp_path / name)])
+    assert len(written[0]) == 6
+    assert written[0] == written[1] == written[2]
 
 
 def test_hostile_names_are_drawn_as_text_and_nothing_else(tmp_path, plan, make_rows):
