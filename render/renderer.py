@@ -25,6 +25,8 @@ BACKGROUND_SAMPLES = 4
 SPECTRAL_BACKGROUND_SAMPLES = 16
 #: the background belongs to the scene and not to a run: every run sees the same one
 BACKGROUND_SEED = 0
+#: what is rendered around a patch [px]
+_MARGIN = 2
 
 
 class Renderer:
@@ -73,7 +75,8 @@ class Renderer:
         if self._shaft is not None:
             self._lit.update(shaft.placed(self._mi, self._shaft, pose))
         self.rendered += 1
-        return Tile(crop, self._radiance(crop, self._edge(crop, pose, spotlight), seed))
+        inside = crop.hull(self._reach(pose, spotlight), _MARGIN)
+        return Tile(crop, self._radiance(crop, inside, self._edge(crop, pose, spotlight), seed))
 
     @property
     def _few_first(self) -> bool:
@@ -90,21 +93,33 @@ class Renderer:
             edge = np.zeros(pixels.shape, bool)
         return edge.reshape(crop.height, crop.width)
 
-    def _radiance(self, crop: Crop, edge: NDArray[np.bool_], seed: int) -> Image:
-        """The crop `[h, w, C]` by few samples, and by all of them where few leave too much noise and on the edge."""
+    def _radiance(self, crop: Crop, inside: NDArray[np.bool_], edge: NDArray[np.bool_], seed: int) -> Image:
+        """The crop `[h, w, C]` by few samples, and by all of them where few leave too much noise and on the edge.
+
+        Light is `inside` `[h, w]` alone.
+        """
         doubt = np.zeros_like(edge)
+        pixels = crop.pixels(self.scene.camera.shape[1]).reshape(edge.shape)
         if self._few_first and edge.size:
-            radiance, doubt = monte_carlo.mean_and_doubt(self._lit.halves(crop, monte_carlo.PILOT, ~seed), self.noise)
+            halves = np.zeros((*edge.shape, 2, self._lit.channels), np.float32)
+            halves[inside] = self._lit.halves(pixels[inside], monte_carlo.PILOT, ~seed)
+            radiance, doubt = monte_carlo.mean_and_doubt(halves, self.noise)
         else:
             radiance = self._lit.render(crop, self.samples, seed)
-        pixels = crop.pixels(self.scene.camera.shape[1]).reshape(edge.shape)
         for where, samples in ((doubt & ~edge, self.samples), (edge, max(self.edge_samples, self.samples))):
             if where.any():
                 radiance[where] = self._lit.pixels(pixels[where], samples, seed)
         return radiance
 
     def footprint(self, pose: Pose, spotlight: int) -> Crop:
-        """The pixels a spotlight can reach: its cone's outline, moved along the rays by what bumps may add or hide."""
+        """The pixels a spotlight can reach."""
+        camera, reach = self.scene.camera, self._reach(pose, spotlight)
+        if camera.optics is not None and not np.isfinite(reach).all():
+            return Crop.whole(camera.shape)  # an outline that no ray meets may run around all that the pupil shows
+        return Crop.around(reach, camera.shape, _MARGIN)
+
+    def _reach(self, pose: Pose, spotlight: int) -> NDArray[np.float64]:
+        """Its cone's outline `[N, 2]` in the image [px], moved along the rays by what bumps may add or hide."""
         scene = self.scene
         rays = scene.outline(pose, spotlight) - pose.apex
         length = np.linalg.norm(rays, axis=-1, keepdims=True)
@@ -113,11 +128,9 @@ class Renderer:
         points = pose.apex + np.tile(rays / length, (3, 1)) * np.maximum(reach, 0.0)
         camera = scene.camera
         if camera.optics is None:
-            return Crop.around(camera.project(points), camera.shape, margin=2.0)
+            return camera.project(points)
         light = scene.illumination.spectrum  # whose colours end in different places
-        pixels = np.concatenate([camera.seeing(w).project(points) for w in (light.low, light.high)])
-        # an outline that no ray meets may run around all that the pupil shows
-        return Crop.around(pixels, camera.shape, margin=2.0) if np.isfinite(pixels).all() else Crop.whole(camera.shape)
+        return np.concatenate([camera.seeing(w).project(points) for w in (light.low, light.high)])
 
     def background(self, pose: Pose | None = None) -> Image:
         """The radiance `[H, W, C]` [W m-2 sr-1] in ambient light alone. With a visible shaft it needs the pose."""

@@ -136,14 +136,14 @@ class Stage:
                 values[first : first + size, self._seen] = np.concatenate(layers, axis=-1)
         return values
 
-    def halves(self, crop: Crop, samples: int, seed: int) -> Image:
-        """The crop's radiance by each half of the samples alone `[h, w, 2, C]`, where it `tells_noise`."""
-        image = np.zeros((crop.height, crop.width, 2, self.channels), np.float32)
-        flat, pixels, size = image.reshape(-1, 2, self.channels), crop.pixels(self._columns), PASS // samples
+    def halves(self, pixels: NDArray[np.uint32], samples: int, seed: int) -> Image:
+        """The radiance `[N, 2, C]` of pixels by each half of the samples alone, where the stage `tells_noise`."""
+        values = np.zeros((len(pixels), 2, self.channels), np.float32)
+        size = PASS // samples
         for first in range(0, len(pixels) if self._seen else 0, size):
             part = pixels[first : first + size]
-            flat[first : first + size, :, self._seen] = self._wavefront(part, samples, seed, halves=True)
-        return image
+            values[first : first + size, :, self._seen] = self._wavefront(part, samples, seed, halves=True)
+        return values
 
     def _wavefront(self, pixels: NDArray[np.uint32], samples: int, seed: int, halves: bool = False) -> Image:
         assert self._rays is not None

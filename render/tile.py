@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
+import cv2
 import numpy as np
 from numpy.typing import NDArray
 
@@ -52,6 +53,19 @@ class Crop:
             grown = run
         if grown:
             yield grown
+
+    def hull(self, pixels: NDArray[np.float64], margin: int) -> NDArray[np.bool_]:
+        """Which of its pixels `[height, width]` lie within `margin` [px] of the hull of `pixels` `[N, 2]` (x, y).
+
+        All of them where some are NaN: what the camera does not see may lie beyond those that it does.
+        """
+        if not np.all(np.isfinite(pixels)) or not self.height or not self.width:
+            return np.ones((self.height, self.width), bool)
+        # OpenCV's pixels have their centres at whole numbers; in sixteenths of a pixel
+        corners = cv2.convexHull((pixels - (self.column + 0.5, self.row + 0.5)).astype(np.float32))
+        filled = np.zeros((self.height, self.width), np.uint8)
+        cv2.fillConvexPoly(filled, np.round(16.0 * corners).astype(np.int32), 1, shift=4)
+        return np.asarray(cv2.dilate(filled, np.ones((2 * margin + 1, 2 * margin + 1), np.uint8)), bool)
 
     def pixels(self, columns: int) -> NDArray[np.uint32]:
         """Its pixels `[height * width]`, each row * columns + column of the frame, ascending."""
