@@ -1,7 +1,7 @@
 """Runs a command and says its wall time, its processor time and the memory of it and all it started, in Linux.
 
 `python benchmarks/measured.py campaign run power_sweep --out /tmp/run`. Memory is the sum of the proportional set sizes
-of all processes at its peak, sampled twice a second, which takes 3 % of a core: a page that two share counts once.
+of all processes at its peak, sampled twice a second: a page that two share counts once.
 """
 
 from __future__ import annotations
