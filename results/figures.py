@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import multiprocessing
 import os
+import signal
 import warnings
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -55,7 +56,7 @@ def draw_figures(drawings: list[Drawing], folder: Path) -> list[Path]:
     shares = [drawings[i::cores] for i in range(cores) if drawings[i::cores]]
     helpers = []
     for share in shares[1:]:
-        helpers.append(multiprocessing.get_context("fork").Process(target=_draw, args=(share, folder), daemon=True))
+        helpers.append(multiprocessing.get_context("fork").Process(target=_help, args=(share, folder), daemon=True))
         with warnings.catch_warnings():
             # of threads that might hold what drawing needs: those of Arrow and BLAS do not
             warnings.simplefilter("ignore", DeprecationWarning)
@@ -73,6 +74,16 @@ def _draw(drawings: list[Drawing], folder: Path) -> None:
     for drawing in drawings:
         with style():
             save(drawing.kind.draw(drawing.cut, drawing.title, drawing.caption), folder / drawing.name)
+
+
+def _help(drawings: list[Drawing], folder: Path) -> None:
+    """Draw in a process of its own, which says nothing of signals or of what is wrong: its parent does."""
+    for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
+        signal.signal(number, signal.SIG_DFL)
+    try:
+        _draw(drawings, folder)
+    except BaseException:
+        os._exit(1)
 
 
 def _cuts(run: Run, boxes: pd.DataFrame) -> Iterator[Cut]:
