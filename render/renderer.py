@@ -75,7 +75,10 @@ class Renderer:
         if self._shaft is not None:
             self._lit.update(shaft.placed(self._mi, self._shaft, pose))
         self.rendered += 1
-        inside = crop.hull(self._reach(pose, spotlight), _MARGIN)
+        if self.scene.camera.optics is None:
+            inside = crop.hull(self._reach(pose, spotlight), _MARGIN)
+        else:  # other colours end between those that were asked
+            inside = np.ones((crop.height, crop.width), bool)
         return Tile(crop, self._radiance(crop, inside, self._edge(crop, pose, spotlight), seed))
 
     @property
