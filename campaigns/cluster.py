@@ -7,6 +7,7 @@ or what the user calls a network to trust.
 from __future__ import annotations
 
 import contextlib
+import shutil
 import sys
 from collections.abc import Iterator
 from typing import TYPE_CHECKING, Any, assert_never
@@ -79,6 +80,9 @@ def job_script(profile: Jobs) -> str:
 def _started(profile: LocalMachine | Jobs) -> Iterator[object]:
     if isinstance(profile, Jobs):
         with contextlib.closing(_submitter(profile)) as jobs:
+            submit = str(jobs.job_cls.submit_command).split()[0]
+            if shutil.which(submit) is None:
+                raise InputError(f"{profile.kind}: there is no {submit} here; run the command where jobs are submitted")
             jobs.scale(jobs=profile.jobs)
             yield jobs
         return

@@ -35,6 +35,7 @@ if TYPE_CHECKING:
 _GLANCE = 0.2  #: how often an interruption is looked for [s]
 _ROLL_CALL = 1.0  #: how often we ask who is there [s]
 _PATIENCE = 60.0  #: how long a scheduler may take to answer, or a worker to be replaced [s]
+_ENTRY_S = 600.0  #: how long a worker may take to import what it needs [s]
 #: what a batch should take [s]: long beside the hundredth of a second that a task costs, short beside what one who dies
 #: makes others repeat
 _BATCH_S = 2.0
@@ -122,8 +123,8 @@ class Crew:
             while True:
                 records += self._ended(task)
                 task = self._done.get_nowait()
-        limit = self._profile.pose_limit
         for hand in list(self._hands.values()):
+            limit = self._profile.pose_limit if hand.batch else max(self._profile.pose_limit, _ENTRY_S)
             if hand.task is not None and time.monotonic() - hand.since > limit:
                 records += self._lose(hand, f"took longer than {limit:g} s", replace=True)
         self.hand_out()

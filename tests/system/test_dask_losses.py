@@ -2,6 +2,7 @@
 
 import os
 import signal
+import socket
 import subprocess
 import sys
 import time
@@ -36,8 +37,8 @@ class FakeBench:
         time.sleep(0.02)
         if what == "dies":
             os.kill(os.getpid(), signal.SIGKILL)
-        if what == "hangs" or (what in ("hangs-once", "waits-once") and first):
-            time.sleep(3600 if what != "waits-once" else 30)
+        if what == "hangs-once" and first:
+            time.sleep(3600)
         if what == "wears" and first:
             self.worn = True
         cases = self.plan.groups[unit.group].cases
@@ -80,35 +81,34 @@ def test_a_worker_that_is_killed_from_outside_costs_no_pose(plan, tmp_path):
 
     errors, notes = do(plan, LocalMachine(kind="local", workers=2), tmp_path, then=kill)
     assert errors == {}
-    assert 1 <= len(notes) <= 2
+    assert 1 <= len([note for note in notes if note.startswith("a worker was lost")]) <= 2
 
 
 class Scheduling:
-    """A scheduler of its own process and one or two workers, as users start them."""
+    """A scheduler and workers that somebody else has started, each a process with children of its own."""
 
     def __init__(self, folder):
-        self.folder, self.address = folder, "tcp://127.0.0.1:18786"
+        with socket.socket() as free:
+            free.bind(("127.0.0.1", 0))
+            self.port = str(free.getsockname()[1])
+        self.folder, self.address = folder, f"tcp://127.0.0.1:{self.port}"
         self.processes = []
 
     def start(self, *command):
-        self.processes.append(
-            subprocess.Popen([sys.executable, "-m", "distributed.cli." + command[0], *command[1:]], cwd=self.folder,
-                             stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
-        )  # fmt: skip
+        program = [sys.executable, "-m", f"distributed.cli.{command[0]}", *command[1:]]
+        quiet = {"stdout": subprocess.DEVNULL, "stderr": subprocess.DEVNULL}
+        self.processes.append(subprocess.Popen(program, cwd=self.folder, **quiet))
         return self.processes[-1]
 
     def scheduler(self):
-        return self.start("dask_scheduler", "--host", "127.0.0.1", "--port", "18786", "--no-dashboard")
+        return self.start("dask_scheduler", "--host", "127.0.0.1", "--port", self.port, "--no-dashboard")
 
     def worker(self):
         return self.start("dask_worker", self.address, "--nthreads", "1", "--no-dashboard")
 
     def stop(self):
         for process in self.processes:
-            with_children = process.pid
-            process.send_signal(signal.SIGCONT)
             process.terminate()
-            assert with_children
         for process in self.processes:
             process.wait(timeout=60)
 
@@ -125,7 +125,7 @@ def test_a_killed_scheduler_ends_the_run_in_a_sentence_and_a_new_one_goes_on(pla
     first = scheduling.scheduler()
     scheduling.worker()
     profile = Scheduler(kind="scheduler", address=scheduling.address)
-    with pytest.raises(RunError, match="tcp://127.0.0.1:18786: the scheduler is gone; what is finished is kept"):
+    with pytest.raises(RunError, match=f"{scheduling.address}: the scheduler is gone; what is finished is kept"):
         do(plan, profile, tmp_path, then=lambda count: first.kill() if count == 20 else None)
     scheduling.scheduler()
     scheduling.worker()

@@ -111,6 +111,13 @@ def test_every_job_system_has_a_script(read, kind, line):
     assert line in jobs_in_words(read(text))
 
 
+def test_a_machine_that_cannot_submit_jobs_is_said_before_anything_waits_for_them(read, monkeypatch):
+    monkeypatch.setenv("PATH", "")
+    profile = read(SLURM + "insecure: true\n")
+    with pytest.raises(InputError, match="slurm: there is no sbatch here"), client_of(profile):
+        pass
+
+
 @pytest.mark.parametrize(
     ("text", "says"),
     [
