@@ -7,6 +7,7 @@ or what the user calls a network to trust.
 from __future__ import annotations
 
 import contextlib
+import logging
 import shutil
 import sys
 from collections.abc import Iterator
@@ -14,6 +15,7 @@ from typing import TYPE_CHECKING, Any, assert_never
 
 from conespot.campaigns.ending import RunError
 from conespot.campaigns.profile import Jobs, LocalMachine, Profile, Scheduler, Tls
+from conespot.campaigns.worker import held_back
 from conespot.render.kernel import VARIANT_OVERRIDE
 from conespot.scene import InputError
 
@@ -88,16 +90,20 @@ def _started(profile: LocalMachine | Jobs) -> Iterator[object]:
         return
     from distributed import LocalCluster
 
-    # workers are processes of one thread with a nanny each, which replaces them
-    with LocalCluster(
-        n_workers=profile.workers,
-        threads_per_worker=1,
-        processes=True,
-        memory_limit=profile.memory,
-        host="127.0.0.1",
-        dashboard_address="127.0.0.1:0",
-        env={VARIANT_OVERRIDE: profile.variant} if profile.variant else {},
-    ) as cluster:
+    # workers are processes of one thread with a nanny each, which replaces them; whom its thread starts, now or later,
+    # never hears of Ctrl-C
+    with held_back():
+        cluster = LocalCluster(
+            n_workers=profile.workers,
+            threads_per_worker=1,
+            processes=True,
+            memory_limit=profile.memory,
+            host="127.0.0.1",
+            dashboard_address="127.0.0.1:0",
+            silence_logs=logging.CRITICAL,
+            env={VARIANT_OVERRIDE: profile.variant} if profile.variant else {},
+        )
+    with cluster:
         yield cluster
 
 

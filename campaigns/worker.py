@@ -213,7 +213,7 @@ def _born() -> Iterator[None]:
     before = {key: os.environ.get(key) for key in meanwhile}
     os.environ.update(meanwhile)
     try:
-        with _held_back():
+        with held_back():
             yield
     finally:
         for key, value in before.items():
@@ -224,7 +224,7 @@ def _born() -> Iterator[None]:
 
 
 @contextlib.contextmanager
-def _held_back() -> Iterator[None]:
+def held_back() -> Iterator[None]:
     """Let the signals wait that a terminal sends to everybody; processes started meanwhile never get them."""
     if not hasattr(signal, "pthread_sigmask"):
         yield
