@@ -7,7 +7,7 @@ call Python for every sample, uses maps averaged over each channel's band instea
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Literal, assert_never
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,8 +24,11 @@ if TYPE_CHECKING:
 _LOW, _HIGH = 300.0, 1100.0
 _LN10 = math.log(10.0)
 
+#: the whole reflectance; what comes back where it falls; or the root of the rest, which light passes going in and out
+Part = Literal["whole", "local", "passage"]
 
-def fundus_texture(mi: Any, dr: Any, maps: FundusMaps, retina: Fundus, extent: float) -> Texture:
+
+def fundus_texture(mi: Any, dr: Any, maps: FundusMaps, retina: Fundus, extent: float, part: Part = "whole") -> Texture:
     """A Mitsuba texture whose coordinates run over +-`extent` mm of arc, v downwards; for JIT variants."""
 
     class FundusTexture(mi.Texture):  # type: ignore[misc]
@@ -55,11 +58,19 @@ def fundus_texture(mi: Any, dr: Any, maps: FundusMaps, retina: Fundus, extent: f
                 at = (si.wavelengths[i] - _LOW + 0.5) / (_HIGH - _LOW + 1.0)
                 template, choroid, arterial, venous, scatter, yellow, white = self.spectra.eval(mi.Float(at), active)
                 absorbed = dr.exp(-grain * (template * melanin + choroid * blood))
-                tissue = (epithelium + dr.square(1.0 - epithelium) * scatter * absorbed) * dr.exp(-yellow * macular)
-                surface = dr.lerp(tissue, white, disc)
+                behind = dr.square(1.0 - epithelium) * scatter * absorbed
+                match part:
+                    case "whole":
+                        surface = dr.lerp((epithelium + behind) * dr.exp(-yellow * macular), white, disc)
+                    case "local":
+                        surface = dr.lerp(epithelium * dr.exp(-yellow * macular), white, disc)
+                    case "passage":
+                        surface = (1.0 - disc) * behind * dr.exp(-yellow * macular)
+                    case _:
+                        assert_never(part)
                 for path, mu in ((artery, arterial), (vein, venous)):
                     surface *= fundus.BLOOD.bypass + (1.0 - fundus.BLOOD.bypass) * dr.exp(-mu * path)
-                result[i] = surface
+                result[i] = dr.sqrt(surface) if part == "passage" else surface
             return result & active
 
         def mean(self) -> Float:

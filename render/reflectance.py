@@ -84,7 +84,8 @@ class Reflectance:
     def texture(self, mi: ModuleType, dr: ModuleType, band: Curve | None = None) -> Texture | dict[str, object]:
         """The Mitsuba texture, over the texture coordinates that `texture_coordinates` gives.
 
-        `band`: for the scalar variant, the weight over which a spectral map is averaged.
+        Of a fundus that spreads light it has the local part alone, what comes back where it falls. `band`: for the
+        scalar variant, the weight over which a spectral map is averaged.
         """
         match self.retina:
             case UniformRetina(albedo=albedo):
@@ -94,7 +95,7 @@ class Reflectance:
             case Fundus() as retina:
                 maps = fundus_maps(retina)
                 if band is None:
-                    return fundus_texture(mi, dr, maps, retina, EXTENT)
+                    return fundus_texture(mi, dr, maps, retina, EXTENT, "local" if retina.spread else "whole")
                 border = round((EXTENT - MAP_EXTENT) / TEXEL)
                 grey = np.pad(maps.band(band, retina, TEXEL), border, mode="edge")
             case PhotoRetina():

@@ -64,7 +64,8 @@ class Renderer:
     def tile(self, pose: Pose, spotlight: int, seed: int) -> Tile:
         """The radiance of one spotlight at 1 W; `seed` decides its Monte Carlo noise.
 
-        With interreflection the light reaches the whole frame, and so does the tile.
+        With interreflection the light reaches the whole frame, and so does the tile. Where the retina spreads light it
+        reaches all but `deep_light.LOST` of what comes back.
         """
         shape = self.scene.camera.shape
         crop = self.footprint(pose, spotlight) if self.scene.interreflection is None else Crop.whole(shape)
@@ -74,12 +75,32 @@ class Renderer:
             self._lit.update({"light.intensity.values": emitters.through_water(self.scene, pose, axis)})
         if self._shaft is not None:
             self._lit.update(shaft.placed(self._mi, self._shaft, pose))
+        if self._lit.glow is not None:
+            self._lit.glow.show_spotlight(pose, spotlight)
         self.rendered += 1
         if self.scene.camera.optics is None:
             inside = crop.hull(self._reach(pose, spotlight), _MARGIN)
         else:  # other colours end between those that were asked
             inside = np.ones((crop.height, crop.width), bool)
-        return Tile(crop, self._radiance(crop, inside, self._edge(crop, pose, spotlight), seed))
+        patch = Tile(crop, self._radiance(crop, inside, self._edge(crop, pose, spotlight), seed))
+        return patch if self._lit.glow is None else self._on_glow(patch, inside, pose, spotlight, seed)
+
+    def _on_glow(self, patch: Tile, inside: NDArray[np.bool_], pose: Pose, spotlight: int, seed: int) -> Tile:
+        """The tile of what a spotlight reaches, `inside` `[h, w]`, in the middle of the deep light around it.
+
+        There is nothing around it but that, which is smooth and dim: few samples do.
+        """
+        assert self._lit.glow is not None
+        camera = self.scene.camera
+        rim = camera.project(self._lit.glow.deep.outline(pose, spotlight))
+        crop = Crop.around(np.concatenate([rim, patch.crop.corners]), camera.shape, _MARGIN)
+        if camera.optics is not None and not np.isfinite(rim).all():
+            crop = Crop.whole(camera.shape)
+        radiance = self._lit.glowing(crop, monte_carlo.PILOT, seed)
+        row, column = patch.crop.row - crop.row, patch.crop.column - crop.column
+        part = radiance[row : row + patch.crop.height, column : column + patch.crop.width]
+        part[inside] = patch.radiance[inside]
+        return Tile(crop, radiance)
 
     @property
     def _few_first(self) -> bool:
@@ -115,7 +136,7 @@ class Renderer:
         return radiance
 
     def footprint(self, pose: Pose, spotlight: int) -> Crop:
-        """The pixels a spotlight can reach."""
+        """The pixels a spotlight can reach; deep light comes back from around them."""
         camera, reach = self.scene.camera, self._reach(pose, spotlight)
         if camera.optics is not None and not np.isfinite(reach).all():
             return Crop.whole(camera.shape)  # an outline that no ray meets may run around all that the pupil shows
@@ -175,7 +196,10 @@ class Renderer:
     def _ambient(self, with_shaft: bool) -> Stage:
         samples = self.samples if with_shaft else self._background_samples
         emitter = emitters.ambient(self.scene)
-        return self._stage(emitter, self.scene.ambient.illumination, samples, with_shaft, like=self._lit)
+        stage = self._stage(emitter, self.scene.ambient.illumination, samples, with_shaft, like=self._lit)
+        if stage.glow is not None:
+            stage.glow.show_ambient()
+        return stage
 
     def _stage(
         self, emitter: dict[str, object], light: Light, samples: int, with_shaft: bool, like: Stage | None = None

@@ -8,7 +8,16 @@ from conespot.render.reflectance import EXTENT
 from conespot.scene import Eye
 
 if TYPE_CHECKING:
-    from mitsuba import Bool, Float, Properties, SurfaceInteraction3f, Texture, UnpolarizedSpectrum
+    from mitsuba import (
+        Bool,
+        Float,
+        Point2f,
+        Properties,
+        SurfaceInteraction3f,
+        Texture,
+        UnpolarizedSpectrum,
+        Vector3f,
+    )
 
 
 def retina_sphere(eye: Eye, bsdf: dict[str, object]) -> dict[str, object]:
@@ -20,6 +29,14 @@ def retina_sphere(eye: Eye, bsdf: dict[str, object]) -> dict[str, object]:
         "flip_normals": True,
         "bsdf": bsdf,
     }
+
+
+def arc_uv(mi: Any, dr: Any, direction: Vector3f, eye: Eye) -> Point2f:
+    """Texture coordinates (see reflectance.py) in directions from the eye's centre."""
+    rho = dr.sqrt(dr.square(direction.x) + dr.square(direction.y))
+    # the angle from the pole over its sine, 1 to the last bit where both vanish
+    stretch = dr.select(rho > 1e-4, dr.atan2(rho, -direction.z) / rho, 1.0) * (eye.radius / (2.0 * EXTENT))
+    return mi.Point2f(0.5 + stretch * direction.x, 0.5 - stretch * direction.y)
 
 
 def on_sphere(mi: Any, dr: Any, texture: Texture | dict[str, object], eye: Eye) -> Texture:
@@ -36,12 +53,8 @@ def on_sphere(mi: Any, dr: Any, texture: Texture | dict[str, object], eye: Eye) 
 
         def eval(self, si: SurfaceInteraction3f, active: Bool | bool = True) -> UnpolarizedSpectrum:
             """Reflectance at the four wavelengths of `si`."""
-            direction = (si.p - mi.Point3f(centre)) / eye.radius
-            rho = dr.sqrt(dr.square(direction.x) + dr.square(direction.y))
-            # the angle from the pole over its sine, 1 to the last bit where both vanish
-            stretch = dr.select(rho > 1e-4, dr.atan2(rho, -direction.z) / rho, 1.0) * (eye.radius / (2.0 * EXTENT))
             there = mi.SurfaceInteraction3f(si)
-            there.uv = mi.Point2f(0.5 + stretch * direction.x, 0.5 - stretch * direction.y)
+            there.uv = arc_uv(mi, dr, (si.p - mi.Point3f(centre)) / eye.radius, eye)
             return self.inner.eval(there, active)
 
         def mean(self) -> Float:

@@ -11,6 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from conespot.render import globe, kernel, spectral, wavefront
+from conespot.render.deep_light import DeepLight
+from conespot.render.glow import Glow
 from conespot.render.rays import RayGenerator
 from conespot.render.reflectance import Reflectance
 from conespot.render.retina_mesh import retina_mesh
@@ -18,6 +20,7 @@ from conespot.render.retina_sphere import on_sphere, retina_sphere
 from conespot.render.tile import Crop
 from conespot.scene import Scene
 from conespot.scene.illumination import Light
+from conespot.scene.retina import Fundus
 from conespot.scene.spectrum import Curve
 
 if TYPE_CHECKING:
@@ -93,6 +96,10 @@ class Stage:
             settings = {"type": "scene", "embree_use_robust_intersections": True, "integrator": integrator}
             self._scenes.append(mi.load_dict({**settings, "sensor": sensor, **everything}))
         self._parameters = [mi.traverse(loaded) for loaded in self._scenes]
+        self.glow = None
+        if isinstance(scene.retina, Fundus) and scene.retina.spread is not None and self.retina is not None:
+            deep = DeepLight(scene, scene.retina, [channels[i].film for i in self._seen])
+            self.glow = Glow(scene.eye, scene.retina, self.retina, deep)
 
     @property
     def tells_noise(self) -> bool:
@@ -145,7 +152,23 @@ class Stage:
             values[first : first + size, :, self._seen] = self._wavefront(part, samples, seed, halves=True)
         return values
 
-    def _wavefront(self, pixels: NDArray[np.uint32], samples: int, seed: int, halves: bool = False) -> Image:
+    def glowing(self, crop: Crop, samples: int, seed: int) -> Image:
+        """The crop's radiance `[h, w, C]` of deep light alone, where the retina has a `glow`."""
+        image = np.zeros((crop.height, crop.width, self.channels), np.float32)
+        flat, pixels, size = image.reshape(-1, self.channels), crop.pixels(self._columns), PASS // samples
+        for first in range(0, len(pixels) if self._seen else 0, size):
+            part = pixels[first : first + size]
+            flat[first : first + size, self._seen] = self._wavefront(part, samples, seed, transport="glow")
+        return image
+
+    def _wavefront(
+        self,
+        pixels: NDArray[np.uint32],
+        samples: int,
+        seed: int,
+        halves: bool = False,
+        transport: wavefront.Transport | None = None,
+    ) -> Image:
         assert self._rays is not None
         self._parameters[0].update()
         return wavefront.trace(
@@ -155,9 +178,10 @@ class Stage:
             self._columns,
             samples,
             seed % 2**32,
-            transport=self.transport,
+            transport=transport or self.transport,
             grey=self._grey,
             halves=halves,
+            glow=self.glow,
         )
 
     def _traced(self, scene: int, pixels: NDArray[np.uint32], samples: int, seed: int) -> Image:

@@ -73,6 +73,13 @@ class Crop:
         return (row[:, None] * np.uint32(columns) + column).ravel()
 
     @property
+    def corners(self) -> NDArray[np.float64]:
+        """The middles of its first and last pixel `[2, 2]` (x, y); none where it is empty."""
+        first = np.array([[self.column, self.row]]) + 0.5
+        size = np.array([[self.width, self.height]])
+        return np.concatenate([first, first + size - 1.0])[: 2 * int(size.all())]
+
+    @property
     def slices(self) -> tuple[slice, slice]:
         """Rows and columns of the frame."""
         return slice(self.row, self.row + self.height), slice(self.column, self.column + self.width)

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from conespot.render import kernel
+from conespot.render.glow import Glow
 from conespot.render.rays import RayGenerator
 
 if TYPE_CHECKING:
@@ -16,8 +17,8 @@ if TYPE_CHECKING:
     from mitsuba import RayDifferential3f, SamplingIntegrator, Scene, Spectrum
 
 #: how light comes to what the camera sees: from the emitter, which nothing can hide; from the emitter, unless something
-#: does; or by the integrator's paths
-Transport = Literal["unblocked", "direct", "path"]
+#: does; by the integrator's paths; or through the tissue alone
+Transport = Literal["unblocked", "direct", "path", "glow"]
 
 
 def trace(
@@ -31,6 +32,7 @@ def trace(
     transport: Transport,
     grey: Sequence[float] | None = None,
     halves: bool = False,
+    glow: Glow | None = None,
 ) -> NDArray[np.float32]:
     """What the film's channels see `[N, C]` of the pixels `[N]` (row * width + column) of a Mitsuba scene.
 
@@ -38,7 +40,8 @@ def trace(
     of its own of the pixel's area, and one of the film's wavelengths; a pixel's depend on `seed` and its place in the
     frame, not on the other pixels asked for. Where light that is reflected twice goes depends on those too. Where all
     wavelengths are alike, `grey` has the integral of each channel's response. With `halves`, `[N, 2, C]`: of each half
-    of the samples, which lie on the pixel's cells like a chequerboard's two colours.
+    of the samples, which lie on the pixel's cells like a chequerboard's two colours. `glow` is what the retina adds to
+    light reflected once.
     """
     mi, dr, _ = kernel.load()
     sensor = loaded.sensors()[0]
@@ -77,8 +80,12 @@ def trace(
             bounces.seed(seed, len(pixels) * samples)
             paths = cast("SamplingIntegrator", loaded.integrator())
             light, met, _ = paths.sample(loaded, bounces, ray)
+        case "glow":
+            light, met = mi.Spectrum(0.0), mi.Bool(True)
         case _:
             assert_never(transport)
+    if glow is not None:
+        light += glow.along(loaded, ray)
     met &= seen
     if grey is None:
         values = film.prepare_sample(weight * light, ray.wavelengths, channels, 1.0, 1.0, met)[:-1]

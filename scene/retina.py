@@ -8,6 +8,7 @@ from pydantic import Field, model_validator
 
 from conespot.scene.model import Model, named
 
+Pigmentation = Literal["light", "medium", "dark"]
 _Albedo = Annotated[float, Field(gt=0.0, le=1.0)]
 
 
@@ -80,6 +81,15 @@ class Glint(Model):
     roughness: float = Field(0.15, gt=0.0, le=1.0)
 
 
+class Spread(Model):
+    """Light that enters the tissue behind the pigment epithelium comes back elsewhere (scene.spread).
+
+    `scattering` multiplies the scattering coefficients of all layers, which are known to a factor of two.
+    """
+
+    scattering: float = Field(1.0, ge=0.5, le=2.0)
+
+
 class Fundus(Model):
     """A living fundus: spectral reflectance from maps of pigments, blood, vessels and disc.
 
@@ -90,13 +100,20 @@ class Fundus(Model):
     kind: Literal["fundus"] = "fundus"
     source: Literal["photo", "procedural"] = "photo"
     seed: int = Field(0, ge=0, lt=2**32)
-    pigmentation: Literal["light", "medium", "dark"] = "medium"
+    pigmentation: Pigmentation = "medium"
     vessels: bool = True
     artery_saturation: float = Field(0.97, ge=0.0, le=1.0)
     vein_saturation: float = Field(0.60, ge=0.0, le=1.0)
     detail: float = Field(0.06, ge=0.0, le=0.3)
     water: bool = True  #: whether the vitreous absorbs like water, to and from the retina
     glint: Glint | None = None
+    spread: Spread | None = None  #: None: all light comes back where it falls
+
+    @model_validator(mode="after")
+    def _one_surface(self) -> Fundus:
+        if self.glint is not None and self.spread is not None:
+            raise ValueError("glint and spread: how deep light leaves through a coat is not worked out; leave one out")
+        return self
 
     @property
     def is_spectral(self) -> bool:

@@ -21,7 +21,7 @@ from conespot.scene.model import Model, unknown_name
 from conespot.scene.pose import Pose, cone_rays
 from conespot.scene.power import Power
 from conespot.scene.quantity import format_quantity
-from conespot.scene.retina import PhotoRetina, Retina
+from conespot.scene.retina import Fundus, PhotoRetina, Retina
 from conespot.scene.sensor import Sensor, Srgb8
 from conespot.scene.spectrum import Curve
 from conespot.scene.spotlights import RIGS, Instrument, Spotlights, spotlight_axes
@@ -108,6 +108,8 @@ class Scene(Model):
             raise ValueError(f"the surface rises or sinks by up to {surface.relief:g} mm, over half the eye's radius")
         if self.interreflection is not None and surface != Surface(bumps=surface.bumps):
             raise ValueError("interreflection is worked out in a sphere: leave semi_axes and height_map out of surface")
+        if self.interreflection is not None and isinstance(self.retina, Fundus) and self.retina.spread is not None:
+            raise ValueError("interreflection and retina.spread: no rendering has both; leave one of them out")
         return self
 
     def through(self, name: str) -> Scene:
