@@ -28,7 +28,8 @@ def whole_outlines(mask, count):
     found, _ = cv2.findContours(mask, cv2.RETR_EXTERNAL, cv2.CHAIN_APPROX_SIMPLE)
     blobs = sorted(((cv2.contourArea(c), c[:, 0]) for c in found if len(c) >= 6), key=lambda blob: -blob[0])
     largest = [c for area, c in blobs[:count] if area > 0.0 and area >= 0.1 * blobs[0][0]]
-    cut = any(c.min() == 0 or c.max() == len(mask) - 1 for c in largest)
+    last = np.array(mask.shape[::-1]) - 1
+    cut = any(c.min() == 0 or np.any(c == last) for c in largest)
     return None if cut or len(largest) < count else largest
 
 
