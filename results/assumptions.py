@@ -49,8 +49,13 @@ def assumptions(cases: Cases, about: Pairs) -> Assumptions:
 
     Where the pairs differ, what each of them assumes is named. A case that is not described states nothing.
     """
-    sets = [_of(cases.get(case), localizer).columns() for case, localizer in about]
-    return Assumptions(**{name: either(one[name] for one in sets) for name in Assumptions().columns()})
+    return together(_of(cases.get(case), localizer) for case, localizer in about)
+
+
+def together(sets: Iterable[Assumptions]) -> Assumptions:
+    """What several sets assume, named where they differ."""
+    columns = [one.columns() for one in dict.fromkeys(sets)]
+    return Assumptions(**{name: either(one[name] for one in columns) for name in Assumptions().columns()})
 
 
 def theory_assumptions() -> Assumptions:

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
 import pandas as pd
 from pandas.api.types import is_numeric_dtype
 
-from conespot.results.assumptions import pairs
+from conespot.results.assumptions import Assumptions, assumptions, pairs, theory_assumptions, together
 from conespot.results.expectation import ANY, Expectation, Expectations, Label
 from conespot.results.metrics import METRICS, AnyTable, Metric
 from conespot.results.run import Run
@@ -28,10 +28,11 @@ class _UnclearError(Exception):
 
 @dataclass(frozen=True)
 class Verdict:
-    """What a run says to an expectation: the number `found`, or why it cannot be judged (`unclear`)."""
+    """What a run says to an expectation: the number `found` and what it `assumes`, or why it is `unclear`."""
 
     expectation: Expectation
     found: float = math.nan
+    assumes: Assumptions = field(default_factory=Assumptions)
     unclear: str = ""
 
     @property
@@ -83,7 +84,7 @@ def check(run: Run, expectations: Sequence[Expectation]) -> list[Verdict]:
             lines = _selected(*tables[metric.table], expectation)
             if metric.table == "errors":
                 _refuse_unfinished(run, lines)
-            verdicts.append(Verdict(expectation, _value(metric, lines)))
+            verdicts.append(Verdict(expectation, _value(metric, lines), _assumed(run, metric.table, lines)))
         except _UnclearError as error:
             verdicts.append(Verdict(expectation, unclear=str(error)))
     return verdicts
@@ -97,15 +98,17 @@ def verdict_table(verdicts: Sequence[Verdict]) -> Table:
     for v in judged:
         e = v.expectation
         numbers = {"value": e.value, "expected": e.words, "found": v.found, "ratio": v.ratio, "verdict": v.word}
-        records.append({"metric": e.metric, "where": v.title.partition(": ")[2], **numbers, "source": e.source})
+        where = v.title.partition(": ")[2]
+        records.append({"metric": e.metric, "where": where, **numbers, "source": e.source, **v.assumes.columns()})
         last = v.word if v.holds else v.word.upper()
-        lines.append((e.source, e.metric, records[-1]["where"], e.words, number(v.found), number(v.ratio), last))
+        lines.append((e.source, e.metric, where, e.words, number(v.found), number(v.ratio), last))
     header = ("source", "metric", "where", "expected", "found", "ratio", "verdict")
     missed = sum(not v.holds for v in judged)
     heading = f"{len(judged) - missed} of {len(judged)} hold" if judged else "nothing to judge"
     left = len(verdicts) - len(judged)
-    notes = (f"{left} more are about what is not, or not unambiguously, in this run: `campaign check` says why.",)
-    block = Block(heading, header, tuple(lines), notes if left else ())
+    more = f"{left} more are about what is not, or not unambiguously, in this run: `campaign check` says why."
+    assumed = (f"Assumes: {together(v.assumes for v in judged).sentence()}.",) if judged else ()
+    block = Block(heading, header, tuple(lines), (*([more] if left else ()), *assumed))
     return Table("expectations", "Expectations of the campaign", pd.DataFrame(records), (block,))
 
 
@@ -124,6 +127,17 @@ def _value(metric: Metric, lines: pd.DataFrame) -> float:
             return float((lines[metric.column] == "failed").mean())
         case "value":
             return float(lines[metric.column].iloc[0])
+
+
+def _assumed(run: Run, table: AnyTable, lines: pd.DataFrame) -> Assumptions:
+    match table:
+        case "errors":
+            return assumptions(run.cases, pairs(lines))
+        case "table_1":
+            return theory_assumptions()
+        case "white":
+            names = Assumptions().columns()
+            return together(Assumptions(*line) for line in lines[list(names)].itertuples(index=False))
 
 
 def _table(run: Run, table: AnyTable) -> tuple[pd.DataFrame | None, Sequence[str]]:
