@@ -10,6 +10,8 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Any
 
+import numpy as np
+
 from conespot.campaigns.schema import Campaign
 from conespot.scene import Scene
 from conespot.scene.identity import essence, identity
@@ -53,6 +55,12 @@ def campaign_address(campaign: Campaign, cases: Iterable[tuple[str, tuple[str, .
 def places_address(campaign: Campaign) -> str:
     """What names the places a trajectory visits: the same in every scene, so that cases can be compared by pose."""
     return identity("places", campaign.trajectory, campaign.poses)
+
+
+def course_seed(campaign: Campaign) -> int:
+    """The seed of a motion along a trajectory: one for all its poses, however many, powers, cameras and localizers."""
+    key = int(identity("course", campaign.trajectory), 16)
+    return int(np.random.SeedSequence([campaign.seed, key]).generate_state(1)[0])
 
 
 def at_one_watt(scene: Scene) -> Scene:

@@ -21,6 +21,9 @@ from conespot.scene.atomic import write_atomically
 from conespot.scene.identity import SCHEMA, digest
 from conespot.scene.words import assumed
 
+#: long tables that a digest stands for
+_POINTS = ("points", "times")
+
 
 def write_cases(folder: Path, plan: Plan) -> None:
     """Write what the cases of a plan are: the same whenever and wherever the same campaign is read."""
@@ -68,6 +71,7 @@ def _without_points(data: Any) -> Any:
     if not isinstance(data, dict):
         return data
     if data.get("points"):
-        kept = {key: Path(value).name if key == "file" else value for key, value in data.items() if key != "points"}
-        data = {**kept, "digest": digest(data["points"])}
+        kept = {key: Path(value).name if key == "file" else value for key, value in data.items() if key not in _POINTS}
+        points = {key: data[key] for key in _POINTS if data.get(key)}
+        data = {**kept, "digest": digest(points if len(points) > 1 else data["points"])}
     return {key: _without_points(value) for key, value in data.items()}

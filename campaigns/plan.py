@@ -12,13 +12,15 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from conespot.campaigns.address import Addresses, at_one_watt, campaign_address, places_address
+from conespot.campaigns.address import Addresses, at_one_watt, campaign_address, course_seed, places_address
 from conespot.campaigns.knowledge import Knowledge
 from conespot.campaigns.labels import label_columns, swept_columns
 from conespot.campaigns.schema import Campaign, Combination, base, combinations, makes_frames
 from conespot.results.columns import MAX_ROWS
 from conespot.scene import InputError, Pose, Scene
 from conespot.scene.document import Document
+from conespot.scene.motion import exposure_of
+from conespot.scene.trajectory import Waypoints
 
 
 @dataclass(frozen=True)
@@ -51,6 +53,7 @@ class Case:
 class Group:
     """Cases that share every rendering. `scene` is theirs at 1 W, `positions` `[N, 3]` [mm] the tips of its poses.
 
+    Where something moves, `times` `[N]` [s] are those of mid-exposure and `course` is the seed of a tremor.
     Groups with the same `scene_key` share what is loaded and the background.
     """
 
@@ -61,10 +64,13 @@ class Group:
     edge_samples: int
     positions: NDArray[np.float64]
     cases: tuple[Case, ...]
+    times: NDArray[np.float64] | None = None
+    course: int = 0
 
     def pose(self, index: int) -> Pose:
         """The pose of that number."""
-        return Pose.through(self.positions[index], self.scene.instrument.rcm)
+        sway = None if self.times is None else self.scene.sway(float(self.times[index]), self.course)
+        return Pose.through(self.positions[index], self.scene.instrument.rcm, sway)
 
     def unit(self, index: int) -> str:
         """The key of the unit of work that is that pose."""
@@ -204,7 +210,8 @@ def make_plan(document: Document) -> Plan:
         first = {c.frame: i for i, c in reversed(list(enumerate(shared)))}
         alike = tuple(sorted(shared, key=lambda c: first[c.frame]))
         loaded = drafts[shared[0].key].addresses.scene
-        groups.append(Group(key, loaded, at_one_watt(case.scene), *samples, positions[key], alike))
+        scene, times, course = at_one_watt(case.scene), _times(case), course_seed(case)
+        groups.append(Group(key, loaded, scene, *samples, positions[key], alike, times, course))
     address = campaign_address(campaign, ((case.key, case.localizers) for case in cases))
     return Plan(campaign, tuple(cases), tuple(groups), address)
 
@@ -226,4 +233,28 @@ def _positions(combination: Combination) -> NDArray[np.float64]:
             scene.pose(positions[i])
         except ValueError as error:
             raise InputError(f"{place}: pose {i} of the {case.trajectory.kind}: {error}") from None
+    _keep_inside(case, positions, depth, place)
     return positions
+
+
+def _times(case: Campaign) -> NDArray[np.float64] | None:
+    """When the poses of a case are at mid-exposure `[N]` [s]: as its trajectory says, or its motion; None if still."""
+    if case.scene.motion is None:
+        return None
+    said = case.trajectory.times if isinstance(case.trajectory, Waypoints) else ()
+    return np.array(said[: case.poses]) if said else case.scene.motion.times(case.poses)
+
+
+def _keep_inside(case: Campaign, positions: NDArray[np.float64], depth: NDArray[np.float64], place: str) -> None:
+    """Raises InputError, with the `place` of the trajectory, where a motion takes the tip out of the eye."""
+    scene, times = case.scene, _times(case)
+    if scene.motion is None or times is None:
+        return
+    near = depth <= scene.motion.reach(exposure_of(scene.motion, scene.sensor))
+    for i in np.flatnonzero(near):
+        sway = scene.sway(float(times[i]), course_seed(case))
+        if sway is not None and not np.all(scene.depth(positions[i] + sway) > 0.0):
+            raise InputError(
+                f"{place}: pose {i} of the {case.trajectory.kind}: the tip moves into the eye's wall during the"
+                " exposure; keep it further inside, or let scene.motion be less"
+            )

@@ -282,7 +282,8 @@ def _located(data: Any, folder: Path) -> Any:
     if not isinstance(data, dict):
         return data
     if data.get("kind") == "csv" and isinstance(data.get("file"), str):
-        data = {k: v for k, v in data.items() if k != "points"} | {"file": str((folder / data["file"]).resolve())}
+        data = {k: v for k, v in data.items() if k not in ("points", "times")}
+        data = {**data, "file": str((folder / data["file"]).resolve())}
     if isinstance(data.get("calibration"), str):
         data = {**data, "calibration": str((folder / data["calibration"]).resolve())}
     if isinstance(data.get("scene.camera.calibration"), list):

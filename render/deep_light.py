@@ -25,6 +25,7 @@ from conespot.render.chart import CELL, Chart
 from conespot.render.fundus_anatomy import COARSE, EXTENT
 from conespot.render.fundus_maps import fundus_maps
 from conespot.render.retina_mesh import arc_extent
+from conespot.render.source import stands
 from conespot.scene import Pose, Scene, fundus
 from conespot.scene.power import Power
 from conespot.scene.retina import Fundus
@@ -71,16 +72,20 @@ class DeepLight:
     def spotlight(self, pose: Pose, spotlight: int) -> DeepMaps:
         """Of a spotlight at 1 W."""
         scene, beam = self.scene, self.scene.beam
-        axis = spotlight_axes(pose, scene.spotlights)[spotlight]
-        rays, solid_angle = cone_lattice(axis, beam.half_angle, RAYS)
-        hit = scene.surface.intersect(scene.eye, pose.apex, rays)
-        met = np.all(np.isfinite(hit), axis=-1)
         intensity = Power(value=1.0, convention=scene.power.convention).axial_intensity(beam) * _PER_M2
-        flux = intensity * solid_angle * beam.intensity(rays @ axis)[met]
-        away = hit[met] - scene.eye.centre
         centre, around = self._patch(pose, spotlight)
         chart = Chart.about(scene, centre, around + self.reach)
-        density = chart.gathered(away / np.linalg.norm(away, axis=-1, keepdims=True), flux)
+        points = stands(scene, pose, spotlight)
+        density = np.zeros((chart.side, chart.side))
+        for point in points:
+            axis = spotlight_axes(point, scene.spotlights)[spotlight]
+            rays, solid_angle = cone_lattice(axis, beam.half_angle, RAYS // len(points))
+            hit = scene.surface.intersect(scene.eye, point.apex, rays)
+            met = np.all(np.isfinite(hit), axis=-1)
+            flux = intensity * solid_angle * beam.intensity(rays @ axis)[met] / len(points)
+            away = hit[met] - scene.eye.centre
+            density += chart.gathered(away / np.linalg.norm(away, axis=-1, keepdims=True), flux)
+        axis = spotlight_axes(pose, scene.spotlights)[spotlight]
         on_axis = scene.surface.intersect(scene.eye, pose.apex, axis)
         return self._spread(chart, density, float(np.linalg.norm(on_axis - pose.apex)))
 

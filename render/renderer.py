@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from conespot.render import emitters, kept, kernel, monte_carlo, shaft, spectral
 from conespot.render.rim import rim_pixels
+from conespot.render.source import Source, outermost
 from conespot.render.stage import Stage
 from conespot.render.tile import Crop, Tile
 from conespot.scene import Pose, Scene
@@ -58,12 +59,14 @@ class Renderer:
         self._mi, _, self._kernel = kernel.load()
         self._shaft = scene.instrument.shaft
         self._responses = responses
+        self._source = Source.of(scene)
         emitter = emitters.spotlight(self._mi, scene)
         self._lit = self._stage(emitter, scene.illumination, samples, self._shaft is not None)
 
     def tile(self, pose: Pose, spotlight: int, seed: int) -> Tile:
         """The radiance of one spotlight at 1 W; `seed` decides its Monte Carlo noise.
 
+        It is that of the whole core, and the mean over an exposure in which the tip sways as the pose says.
         With interreflection the light reaches the whole frame, and so does the tile. Where the retina spreads light it
         reaches all but `deep_light.LOST` of what comes back.
         """
@@ -71,6 +74,8 @@ class Renderer:
         crop = self.footprint(pose, spotlight) if self.scene.interreflection is None else Crop.whole(shape)
         axis = spotlight_axes(pose, self.scene.spotlights)[spotlight]
         self._lit.update({"light.to_world": emitters.aim(self._mi, pose.apex, axis)})
+        if self._source is not None:
+            self._source.aim(pose, axis)
         if spectral.has_water(self.scene):
             self._lit.update({"light.intensity.values": emitters.through_water(self.scene, pose, axis)})
         if self._shaft is not None:
@@ -145,16 +150,20 @@ class Renderer:
     def _reach(self, pose: Pose, spotlight: int) -> NDArray[np.float64]:
         """Its cone's outline `[N, 2]` in the image [px], moved along the rays by what bumps may add or hide."""
         scene = self.scene
-        rays = scene.outline(pose, spotlight) - pose.apex
-        length = np.linalg.norm(rays, axis=-1, keepdims=True)
-        # three times the relief covers any incidence up to 70 deg
-        reach = np.concatenate([length + k * scene.surface.relief for k in (-3.0, 0.0, 3.0)])
-        points = pose.apex + np.tile(rays / length, (3, 1)) * np.maximum(reach, 0.0)
+        points = np.concatenate([self._cone(one, spotlight) for one in outermost(scene, pose, spotlight)])
         camera = scene.camera
         if camera.optics is None:
             return camera.project(points)
         light = scene.illumination.spectrum  # whose colours end in different places
         return np.concatenate([camera.seeing(w).project(points) for w in (light.low, light.high)])
+
+    def _cone(self, pose: Pose, spotlight: int) -> NDArray[np.float64]:
+        """The outline `[N, 3]` [mm] of a still point's cone, moved along the rays by what bumps may add or hide."""
+        rays = self.scene.outline(pose, spotlight) - pose.apex
+        length = np.linalg.norm(rays, axis=-1, keepdims=True)
+        # three times the relief covers any incidence up to 70 deg
+        reach = np.concatenate([length + k * self.scene.surface.relief for k in (-3.0, 0.0, 3.0)])
+        return np.asarray(pose.apex + np.tile(rays / length, (3, 1)) * np.maximum(reach, 0.0))
 
     def background(self, pose: Pose | None = None) -> Image:
         """The radiance `[H, W, C]` [W m-2 sr-1] in ambient light alone. With a visible shaft it needs the pose."""
@@ -213,5 +222,6 @@ class Renderer:
             shapes=shaft.shaft_shapes(self._mi, self._shaft) if with_shaft and self._shaft is not None else {},
             responses=self._responses,
             closed=like is None,
+            source=self._source if like is None else None,
             like=like,
         )

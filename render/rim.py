@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from conespot.render.source import outermost
+from conespot.render.tile import Crop
 from conespot.scene import Pose, Scene
 from conespot.scene.beam import HardBeam
 
@@ -18,7 +21,8 @@ _STEP = 0.25
 def rim_pixels(scene: Scene, pose: Pose, spotlight: int) -> NDArray[np.uint32]:
     """The pixels `[N]` of the frame (row * width + column, ascending) within half a pixel of a steep beam.
 
-    None where the beam is soft. Edges of shadows that bumps or the shaft cast are not among them.
+    Of a source that has a core or moves, the whole penumbra. None where the beam is soft. Edges of shadows that bumps
+    or the shaft cast are not among them.
     """
     (height, width), b = scene.camera.shape, scene.beam.half_angle
     rim = scene.camera.project(scene.outline(pose, spotlight))
@@ -30,6 +34,9 @@ def rim_pixels(scene: Scene, pose: Pose, spotlight: int) -> NDArray[np.uint32]:
     angles = np.arange(b + (1.0 - _STEP / 2.0) * pixel, 0.0, -_STEP * pixel)
     ahead, behind = (scene.beam.intensity(np.cos(angles + k * pixel / 2.0)) for k in (1.0, -1.0))
     steep = angles[np.abs(ahead - behind) > STEEP]
+    poses = outermost(scene, pose, spotlight)
+    if len(poses) > 1:
+        return _penumbra(scene, poses, spotlight, steep)
     around = int(np.nansum(np.linalg.norm(rim - np.roll(rim, 1, axis=0), axis=-1))) + 4
     found = []
     for angle in steep:
@@ -41,3 +48,36 @@ def rim_pixels(scene: Scene, pose: Pose, spotlight: int) -> NDArray[np.uint32]:
         inside = (column >= 0) & (column < width) & (row >= 0) & (row < height)
         found.append(np.unique(row[inside] * width + column[inside]))
     return np.unique(np.concatenate([np.zeros(0, int), *found])).astype(np.uint32)
+
+
+def _penumbra(scene: Scene, poses: list[Pose], spotlight: int, steep: NDArray[np.float64]) -> NDArray[np.uint32]:
+    """The pixels that some of the poses' cones reach with their `steep` angles [rad], or some and not all of them."""
+    if not len(steep):
+        return np.zeros(0, np.uint32)
+    shape = scene.camera.shape
+    outer, inner = ([_outline(scene, pose, spotlight, angle) for pose in poses] for angle in (steep.max(), steep.min()))
+    crop = Crop.around(np.concatenate(outer), shape, 2.0)
+    if not crop.height or not crop.width:
+        return np.zeros(0, np.uint32)
+    some = np.any([_filled(crop, outline) for outline in outer], axis=0).astype(np.uint8)
+    every = np.all([_filled(crop, outline) for outline in inner], axis=0).astype(np.uint8)
+    near = np.ones((3, 3), np.uint8)
+    # beyond the crop is more of the patch where the frame cuts it
+    band = (cv2.dilate(some, near) > 0) & (cv2.erode(every, near) == 0)
+    return crop.pixels(shape[1])[band.ravel()]
+
+
+def _outline(scene: Scene, pose: Pose, spotlight: int, angle: float) -> NDArray[np.float64]:
+    """Where the camera sees a cone of that half angle [rad] end `[N, 2]` [px]."""
+    cone = scene.model_copy(update={"beam": HardBeam(half_angle=angle)})
+    points = scene.camera.project(cone.outline(pose, spotlight))
+    return np.asarray(points[np.isfinite(points[:, 0])])
+
+
+def _filled(crop: Crop, outline: NDArray[np.float64]) -> NDArray[np.bool_]:
+    """Which of the crop's pixels lie within an outline `[N, 2]` [px]; none where that is unknown."""
+    filled = np.zeros((crop.height, crop.width), np.uint8)
+    if len(outline):
+        corners = np.round(16.0 * (outline - (crop.column + 0.5, crop.row + 0.5))).astype(np.int32)
+        cv2.fillPoly(filled, [corners], 1, shift=4)
+    return filled > 0

@@ -17,6 +17,7 @@ from conespot.render.rays import RayGenerator
 from conespot.render.reflectance import Reflectance
 from conespot.render.retina_mesh import retina_mesh
 from conespot.render.retina_sphere import on_sphere, retina_sphere
+from conespot.render.source import Source
 from conespot.render.tile import Crop
 from conespot.scene import Scene
 from conespot.scene.illumination import Light
@@ -50,6 +51,7 @@ class Stage:
         shapes: Mapping[str, object],
         responses: dict[str, Curve] | None = None,
         closed: bool = False,
+        source: Source | None = None,
         like: Stage | None = None,
     ) -> None:
         """Load it. `like` is another stage of the same scene, whose retina is shared where the light plays no part."""
@@ -61,6 +63,12 @@ class Stage:
                 "a camera that is aslant, distorts, or has a principal point or oblong pixels needs a JIT variant of"
                 " Mitsuba, and the scalar one is in use; `campaign doctor` says why"
             )
+        if not chosen.vectorized and source is not None:
+            raise kernel.KernelError(
+                "motion and beam.source_diameter need a JIT variant of Mitsuba, and the scalar one is in use;"
+                " `campaign doctor` says why"
+            )
+        self._source = source
         self._reflectance = Reflectance(scene.retina)
         channels = spectral.channels(scene, light, responses, from_outside=like is not None)
         self.channels = len(channels)
@@ -179,6 +187,7 @@ class Stage:
             samples,
             seed % 2**32,
             transport=transport or self.transport,
+            source=self._source,
             grey=self._grey,
             halves=halves,
             glow=self.glow,

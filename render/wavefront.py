@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from conespot.render import kernel
 from conespot.render.glow import Glow
 from conespot.render.rays import RayGenerator
+from conespot.render.source import Source, Standing
 
 if TYPE_CHECKING:
     from drjit.auto.ad import Bool
@@ -30,6 +31,7 @@ def trace(
     seed: int,
     *,
     transport: Transport,
+    source: Source | None = None,
     grey: Sequence[float] | None = None,
     halves: bool = False,
     glow: Glow | None = None,
@@ -40,8 +42,8 @@ def trace(
     of its own of the pixel's area, and one of the film's wavelengths; a pixel's depend on `seed` and its place in the
     frame, not on the other pixels asked for. Where light that is reflected twice goes depends on those too. Where all
     wavelengths are alike, `grey` has the integral of each channel's response. With `halves`, `[N, 2, C]`: of each half
-    of the samples, which lie on the pixel's cells like a chequerboard's two colours. `glow` is what the retina adds to
-    light reflected once.
+    of the samples, which lie on the pixel's cells like a chequerboard's two colours. A `source` takes the place of an
+    emitter that is a still point. `glow` is what the retina adds to light reflected once.
     """
     mi, dr, _ = kernel.load()
     sensor = loaded.sensors()[0]
@@ -70,11 +72,20 @@ def trace(
     if camera.disperses:  # light of one wavelength goes this way, so cells of the whole range tell them apart
         wavelengths, weight = mi.Spectrum(wavelengths[0]), mi.Spectrum(weight[0])
     ray, seen = camera.rays(x, y, wavelengths)
+    stands = None
+    if source is not None:
+        # cells of the core and of the exposure too, each paired with those of area at random
+        third, fourth = mi.sample_tea_32(second, first)
+        cell = mi.permute_kensler(k, samples, third)
+        across = (mi.Float(cell % columns) + random.next_float32()) / columns
+        along = (mi.Float(cell // columns) + random.next_float32()) * (columns / samples)
+        instant = (mi.Float(mi.permute_kensler(k, samples, fourth)) + random.next_float32()) / samples
+        stands = source.at(mi.Point2f(across, along), instant)
     match transport:
         case "unblocked":
-            light, met = _unblocked(loaded, ray)
+            light, met = _unblocked(loaded, ray, stands)
         case "direct":
-            light, met = _direct(loaded, ray)
+            light, met = _direct(loaded, ray, stands)
         case "path":
             bounces = mi.load_dict({"type": "independent"})
             bounces.seed(seed, len(pixels) * samples)
@@ -98,29 +109,37 @@ def trace(
     return means.reshape(-1, 2, len(values)) if halves else means
 
 
-def _unblocked(loaded: Any, ray: RayDifferential3f) -> tuple[Spectrum, Bool]:
+def _unblocked(loaded: Any, ray: RayDifferential3f, stands: Standing | None) -> tuple[Spectrum, Bool]:
     """What the scene's one shape sends back of the one emitter's light, if nothing can come between them.
 
     The same as `_direct` to the last bit and twice as fast: shape, emitter and BSDF are met in closed form, in the
     kernel itself, where a scene asks Embree for the first and calls whichever the others turn out to be.
     """
-    mi, _, _ = kernel.load()
+    mi, dr, _ = kernel.load()
     shape, emitter = loaded.shapes()[0], loaded.emitters()[0]
     at = shape.ray_intersect(ray, mi.RayFlags.All)
     met = at.is_valid()
-    towards, emitted = emitter.sample_direction(at, mi.Point2f(0.5), met)
-    reflected = shape.bsdf().eval(mi.BSDFContext(), at, at.to_local(towards.d), met)
+    towards, emitted = emitter.sample_direction(stands.seen_from(at) if stands else at, mi.Point2f(0.5), met)
+    direction = dr.normalize(stands.position - at.p) if stands else towards.d
+    reflected = shape.bsdf().eval(mi.BSDFContext(), at, at.to_local(direction), met)
     return emitted * reflected, met
 
 
-def _direct(loaded: Any, ray: RayDifferential3f) -> tuple[Spectrum, Bool]:
+def _direct(loaded: Any, ray: RayDifferential3f, stands: Standing | None) -> tuple[Spectrum, Bool]:
     """What the scene's one emitter, a point or a direction, sends back along rays, and which of them meet anything.
 
     Mitsuba's `direct` integrator does the same, and weighs it against light that BSDF samples would find: here none.
     """
-    mi, _, _ = kernel.load()
+    mi, dr, _ = kernel.load()
     at = loaded.ray_intersect(ray, mi.RayFlags.All, True, True)
     met = at.is_valid()
-    towards, emitted = loaded.sample_emitter_direction(at, mi.Point2f(0.5), True, met)
-    reflected = at.bsdf(ray).eval(mi.BSDFContext(), at, at.to_local(towards.d), met)
+    if stands is None:
+        towards, emitted = loaded.sample_emitter_direction(at, mi.Point2f(0.5), True, met)
+        direction = towards.d
+    else:
+        _, emitted = loaded.emitters()[0].sample_direction(stands.seen_from(at), mi.Point2f(0.5), met)
+        hidden = loaded.ray_test(at.spawn_ray_to(stands.position), met)
+        emitted = dr.select(hidden, 0.0, emitted)
+        direction = dr.normalize(stands.position - at.p)
+    reflected = at.bsdf(ray).eval(mi.BSDFContext(), at, at.to_local(direction), met)
     return emitted * reflected, met

@@ -14,7 +14,7 @@ from numpy.typing import ArrayLike, NDArray
 from pydantic import Field, model_validator
 
 from conespot.scene.model import Model
-from conespot.scene.quantity import Angle, format_quantity
+from conespot.scene.quantity import Angle, Length, format_quantity
 
 Array = NDArray[np.float64]
 _HalfAngle = Annotated[Angle, Field(gt=0.0, lt=math.pi / 2.0)]
@@ -26,6 +26,10 @@ class BeamProfile(Protocol):
     @property
     def half_angle(self) -> float:
         """Angle off the axis beyond which there is no light [rad]."""
+
+    @property
+    def source_diameter(self) -> float:
+        """Diameter of the core that the light leaves [mm]; 0 for a point."""
 
     @property
     def flux_factor(self) -> float:
@@ -46,7 +50,21 @@ class BeamProfile(Protocol):
         """The same profile over another half angle [rad]."""
 
 
-class HardBeam(Model):
+class _Cored(Model):
+    """Light leaves a disc across the cone's axis at the tip, a fibre's core, evenly, from each point with the profile.
+
+    The flux is that of a point, and so is all that is said of the profile alone.
+    """
+
+    source_diameter: Annotated[Length, Field(ge=0.0, le=1.0)] = 0.0  #: 0 for a point [mm]
+
+    @property
+    def _core(self) -> str:
+        """The core in words, after those of the profile."""
+        return f", core {format_quantity(self.source_diameter, 'length')}" if self.source_diameter else ""
+
+
+class HardBeam(_Cored):
     """Uniform radiant intensity up to the half angle."""
 
     kind: Literal["hard"] = "hard"
@@ -59,7 +77,7 @@ class HardBeam(Model):
     @property
     def words(self) -> str:
         """The profile in words, as tables state it."""
-        return f"hard, half angle {format_quantity(self.half_angle, 'angle')}"
+        return f"hard, half angle {format_quantity(self.half_angle, 'angle')}{self._core}"
 
     @property
     def softness(self) -> None:
@@ -80,7 +98,7 @@ class HardBeam(Model):
         return 2.0 * math.pi * (1.0 - math.cos(self.half_angle))
 
 
-class CyclesBeam(Model):
+class CyclesBeam(_Cored):
     """Blender Cycles' spotlight: smoothstep((cos t - cos b) / (blend (1 - cos b))); blend 1 is fully soft."""
 
     kind: Literal["cycles"] = "cycles"
@@ -102,7 +120,7 @@ class CyclesBeam(Model):
     def words(self) -> str:
         """The profile in words, as tables state it."""
         soft = " (fully soft)" if self.blend == 1.0 else ""
-        return f"Cycles blend {self.blend:g}{soft}, half angle {format_quantity(self.half_angle, 'angle')}"
+        return f"Cycles blend {self.blend:g}{soft}, half angle {format_quantity(self.half_angle, 'angle')}{self._core}"
 
     @property
     def softness(self) -> float:
@@ -123,7 +141,7 @@ class CyclesBeam(Model):
         return 2.0 * math.pi * (1.0 - math.cos(self.half_angle)) * (1.0 - self.blend / 2.0)
 
 
-class LinearBeam(Model):
+class LinearBeam(_Cored):
     """Mitsuba's `spot`: full intensity up to `beam_width`, then linear in the angle down to 0 at the half angle."""
 
     kind: Literal["linear"] = "linear"
@@ -149,7 +167,7 @@ class LinearBeam(Model):
     def words(self) -> str:
         """The profile in words, as tables state it."""
         width, half_angle = (format_quantity(angle, "angle") for angle in (self.beam_width, self.half_angle))
-        return f"linear from {width}, half angle {half_angle}"
+        return f"linear from {width}, half angle {half_angle}{self._core}"
 
     @property
     def softness(self) -> None:
@@ -168,7 +186,7 @@ class LinearBeam(Model):
         return 2.0 * math.pi * (1.0 - (math.sin(b) - math.sin(w)) / (b - w))
 
 
-class TabulatedBeam(Model):
+class TabulatedBeam(_Cored):
     """Measured profile: relative `intensities` at `angles`, linear in the angle between them, 0 beyond the last."""
 
     kind: Literal["table"] = "table"
@@ -200,7 +218,7 @@ class TabulatedBeam(Model):
     @property
     def words(self) -> str:
         """The profile in words, as tables state it."""
-        return f"tabulated, half angle {format_quantity(self.half_angle, 'angle')}"
+        return f"tabulated, half angle {format_quantity(self.half_angle, 'angle')}{self._core}"
 
     @property
     def softness(self) -> None:

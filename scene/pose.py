@@ -31,14 +31,19 @@ def rot_z(angle: float) -> Array:
 
 @dataclass(frozen=True)
 class Pose:
-    """Position of the tip `apex` `[3]` [mm], unit `axis` `[3]` into the light, `roll` about the axis [rad]."""
+    """Position of the tip `apex` `[3]` [mm], unit `axis` `[3]` into the light, `roll` about the axis [rad].
+
+    Of an instrument that moves it is the pose at mid-exposure; `sway` `[K, 3]` is where the tip is off it [mm], at even
+    instants from the first to the last of the exposure.
+    """
 
     apex: Array
     axis: Array
     roll: float = 0.0
+    sway: Array | None = None
 
     @classmethod
-    def through(cls, apex: ArrayLike, rcm: ArrayLike) -> Pose:
+    def through(cls, apex: ArrayLike, rcm: ArrayLike, sway: Array | None = None) -> Pose:
         """The pose with its tip at `apex` `[3]` whose axis comes from the remote centre of motion `rcm` `[3]` [mm].
 
         >>> pose = Pose.through([0.0, 0.0, 4.0], [0.0, 3.0, 8.0])
@@ -51,7 +56,7 @@ class Pose:
         length = float(np.linalg.norm(centre - tip))
         if length == 0.0:
             raise ValueError("the tip coincides with the remote centre of motion, so it has no direction")
-        return cls(tip, (tip - centre) / length)
+        return cls(tip, (tip - centre) / length, sway=sway)
 
     @property
     def tilt(self) -> float:

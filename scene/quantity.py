@@ -26,6 +26,8 @@ UNITS: dict[str, dict[str, float]] = {
     "pixels": {"px": 1.0},
     "time": {"s": 1.0, "ms": 1e-3, "us": 1e-6},
     "refraction": {"D": 1.0},
+    "speed": {"mm/s": 1.0, "um/s": 1e-3, "m/s": 1e3},
+    "frequency": {"Hz": 1.0},
 }
 #: the unit a quantity is written back with
 WRITTEN = {
@@ -38,6 +40,8 @@ WRITTEN = {
     "pixels": "px",
     "time": "s",
     "refraction": "D",
+    "speed": "mm/s",
+    "frequency": "Hz",
 }
 _QUANTITY = re.compile(r"\s*([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)\s*([A-Za-z/0-9]+)\s*", re.ASCII)
 
@@ -105,6 +109,8 @@ if TYPE_CHECKING:
     Irradiance = float
     Seconds = float
     Dioptres = float
+    Speed = float
+    Hertz = float
 else:
     Length = _quantity("length")  #: [mm]
     Angle = _quantity("angle")  #: [rad]
@@ -114,3 +120,5 @@ else:
     Irradiance = _quantity("irradiance")  #: [W m-2]
     Seconds = _quantity("time")  #: [s]
     Dioptres = _quantity("refraction")  #: [1/m]
+    Speed = _quantity("speed")  #: [mm/s]
+    Hertz = _quantity("frequency")  #: [1/s]

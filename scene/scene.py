@@ -18,6 +18,7 @@ from conespot.scene.document import Document, find_document, is_file, merge, rea
 from conespot.scene.eye import Eye, Globe
 from conespot.scene.illumination import Ambient, FlatBand, Illumination
 from conespot.scene.model import Model, unknown_name
+from conespot.scene.motion import AnyMotion, exposure_of
 from conespot.scene.pose import Pose, cone_rays
 from conespot.scene.power import Power
 from conespot.scene.quantity import format_quantity
@@ -47,6 +48,7 @@ class Scene(Model):
     retina: Retina = PhotoRetina()
     sensor: Sensor = Srgb8()
     interreflection: Globe | None = None
+    motion: AnyMotion = None
     #: by name, all that look at the same instant, of which `camera` is one: a stereo pair's left and right
     cameras: dict[str, Camera] = Field({}, max_length=8)
 
@@ -112,6 +114,17 @@ class Scene(Model):
             raise ValueError("interreflection and retina.spread: no rendering has both; leave one of them out")
         return self
 
+    @model_validator(mode="after")
+    def _smears_what_it_can(self) -> Scene:
+        if self.interreflection is not None and (self.motion is not None or self.beam.source_diameter):
+            key = "beam.source_diameter" if self.motion is None else "motion"
+            raise ValueError(f"interreflection is worked out for a still point of light: leave {key} out")
+        if self.motion is not None:
+            if self.instrument.shaft is not None:
+                raise ValueError("motion: a visible shaft would have to move too; leave instrument.shaft out")
+            exposure_of(self.motion, self.sensor)
+        return self
+
     def through(self, name: str) -> Scene:
         """The scene as another of its `cameras` sees it at the same instant. Raises KeyError for no such camera."""
         return self.model_copy(update={"camera": self.cameras[name]})
@@ -135,14 +148,21 @@ class Scene(Model):
         means = [curve.mean_wavelength if weight > 0.0 else 0.0 for curve, weight in zip(seen, weights, strict=True)]
         return float(weights @ means / weights.sum())
 
-    def pose(self, apex: NDArray[np.float64]) -> Pose:
-        """The pose of the tip at `apex` `[3]` [mm]. Raises ValueError if it is outside the eye or in its wall."""
+    def sway(self, time: float = 0.0, seed: int = 0) -> NDArray[np.float64] | None:
+        """A pose's `sway` `[K, 3]` [mm] at a `time` [s], for the `seed` of a tremor; None without motion."""
+        return None if self.motion is None else self.motion.sway(time, exposure_of(self.motion, self.sensor), seed)
+
+    def pose(self, apex: NDArray[np.float64], time: float = 0.0, seed: int = 0) -> Pose:
+        """The pose of the tip at `apex` `[3]` [mm] at a `time` [s]; a tremor is another for another `seed`.
+
+        Raises ValueError if it is outside the eye or in its wall.
+        """
         if self.depth(apex) <= 0.0:
             raise ValueError(
                 f"the tip at ({', '.join(f'{c:g}' for c in apex)}) mm is outside the eye"
                 f" (radius {self.eye.radius:g} mm)"
             )
-        return Pose.through(apex, self.instrument.rcm)
+        return Pose.through(apex, self.instrument.rcm, self.sway(time, seed))
 
     def depth(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
         """How far inside the surface points `[..., 3]` lie `[...]` [mm], along rays from the eye's centre.

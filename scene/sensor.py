@@ -52,6 +52,10 @@ class ImageSensor(Hashable, Protocol):
         """How the exposure time is found from the light, where it is."""
 
     @property
+    def exposure_time(self) -> float | None:
+        """How long a frame takes [s]; None for a sensor of radiances, which does not say."""
+
+    @property
     def words(self) -> str:
         """How radiance becomes values, in words as tables state it."""
 
@@ -112,6 +116,11 @@ class Srgb8(Model):
         """No exposure time, so nothing to meter."""
         return None
 
+    @property
+    def exposure_time(self) -> None:
+        """None: radiances alone count."""
+        return None
+
     def decode(self, share: Array) -> Array:
         """Signals [white] of shares of the largest value, any shape.
 
@@ -161,6 +170,11 @@ class Linear(Model):
     @property
     def metering(self) -> None:
         """No exposure time, so nothing to meter."""
+        return None
+
+    @property
+    def exposure_time(self) -> None:
+        """None: radiances alone count."""
         return None
 
     def decode(self, share: Array) -> Array:
@@ -237,6 +251,11 @@ class Recorded(Model):
     def metering(self) -> Metering | None:
         """The camera's."""
         return self.camera.metering
+
+    @property
+    def exposure_time(self) -> float | None:
+        """The camera's [s]."""
+        return self.camera.exposure_time
 
     @property
     def words(self) -> str:

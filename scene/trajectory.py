@@ -12,12 +12,13 @@ from pydantic import BeforeValidator, Field, ValidationInfo
 
 from conespot.scene.csv_lines import CsvLine, columns, csv_lines, within
 from conespot.scene.model import Model, unknown_name
-from conespot.scene.quantity import Length, parse_quantity
+from conespot.scene.quantity import Length, Seconds, parse_quantity
 from conespot.scene.text_file import at_home
 
 Array = NDArray[np.float64]
 Point = tuple[Length, Length, Length]
 _COLUMNS = ("x_mm", "y_mm", "z_mm")
+_TIME = "t_s"
 _MOST_POINTS = 100_000
 
 
@@ -122,11 +123,15 @@ class Random(Volume):
 
 
 class Waypoints(Model):
-    """Tip positions from the columns x_mm, y_mm, z_mm of a CSV file, in its order; the first N of them are used."""
+    """Tip positions from the columns x_mm, y_mm, z_mm of a CSV file, in its order; the first N of them are used.
+
+    A column t_s says when the tip is there, which a motion asks for.
+    """
 
     kind: Literal["csv"] = "csv"
     file: str
     points: tuple[Point, ...] = Field((), max_length=_MOST_POINTS, validate_default=False)
+    times: tuple[Seconds, ...] = Field((), max_length=_MOST_POINTS, validate_default=False)
 
     def positions(self, poses: int, rng: np.random.Generator) -> Array:
         """Tip positions `[poses, 3]` [mm]. Raises ValueError if the file has fewer rows."""
@@ -135,21 +140,38 @@ class Waypoints(Model):
         return np.array(self.points[:poses])
 
 
-def _read_points(path: Path) -> list[Point]:
-    """The positions in a CSV file with the columns x_mm, y_mm, z_mm. Raises ValueError with file and line."""
+def _read_points(path: Path) -> tuple[list[Point], list[float]]:
+    """The positions [mm] in a CSV file with the columns x_mm, y_mm, z_mm, and their times [s] if it has a column t_s.
+
+    Raises ValueError with file and line.
+    """
     lines = csv_lines(path, "list of positions")
     header = next(lines, CsvLine(1, ()))
     x, y, z = columns(path, header, _COLUMNS)
+    timed = columns(path, header, (_TIME,)) if _TIME in header.cells else []
     points: list[Point] = []
+    times: list[float] = []
     for line in lines:
         within(path, header, line)
         try:
             points.append((_millimetres(line, x), _millimetres(line, y), _millimetres(line, z)))
         except ValueError as error:
             raise ValueError(f"{path}:{line.number}: x_mm, y_mm, z_mm must be finite numbers ({error})") from None
+        for column in timed:
+            times.append(_seconds(path, line, column, times))
         if len(points) > _MOST_POINTS:
             raise ValueError(f"{path}:{line.number}: more than {_MOST_POINTS} positions")
-    return points
+    return points, times
+
+
+def _seconds(path: Path, line: CsvLine, column: int, before: list[float]) -> float:
+    try:
+        time = parse_quantity(line.value(column), "time")
+    except ValueError as error:
+        raise ValueError(f"{path}:{line.number}: t_s must be a finite number ({error})") from None
+    if before and time <= before[-1]:
+        raise ValueError(f"{path}:{line.number}: t_s must increase, and {time:g} comes after {before[-1]:g}")
+    return time
 
 
 def _millimetres(line: CsvLine, column: int) -> float:
@@ -180,8 +202,9 @@ def _named_trajectory(value: Any, info: ValidationInfo) -> Any:
             raise unknown_name(str(kind), list(KINDS), "trajectory")
         if kind == "csv" and isinstance(value.get("file"), str) and "points" not in value:
             folder = Path((info.context or {}).get("folder", "."))
-            points = _read_points(folder / at_home(Path(value["file"])))
+            points, times = _read_points(folder / at_home(Path(value["file"])))
             value = {**value, "points": [tuple(f"{c!r} mm" for c in p) for p in points]}
+            value = {**value, "times": [f"{time!r} s" for time in times]} if times else value
     return value
 
 

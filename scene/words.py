@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from conespot.scene.motion import exposure_of
 from conespot.scene.quantity import format_quantity
 from conespot.scene.scene import Scene
 
@@ -9,8 +10,11 @@ from conespot.scene.scene import Scene
 def assumed(scene: Scene) -> dict[str, str]:
     """Radius of the eye, edge of the beam, power convention, transfer of the sensor, and surface, in words by name.
 
-    The radius comes with the optics that the eye is seen through, if there are any.
+    The radius comes with the optics that the eye is seen through, the transfer with what moves, if there is any.
     """
+    transfer = scene.sensor.words
+    if scene.motion is not None:
+        transfer += f", {scene.motion.words} during {1e3 * exposure_of(scene.motion, scene.sensor):g} ms"
     radius = format_quantity(scene.eye.radius, "length")
     if scene.camera.optics is not None:
         radius += f" seen through {scene.camera.optics.words}, localized at {scene.effective_wavelength:.0f} nm"
@@ -18,6 +22,6 @@ def assumed(scene: Scene) -> dict[str, str]:
         "radius": radius,
         "edge": scene.beam.words,
         "power_convention": scene.power.words,
-        "transfer": scene.sensor.words,
+        "transfer": transfer,
         "surface": scene.surface.words,
     }
