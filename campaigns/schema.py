@@ -5,9 +5,7 @@ A campaign with a `scene` (given or swept) makes frames; one without may ask for
 
 from __future__ import annotations
 
-import difflib
 import itertools
-import math
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -16,6 +14,7 @@ from typing import Annotated, Any, Literal
 from pydantic import BeforeValidator, Field
 
 from conespot.campaigns.knowledge import Knowledge
+from conespot.campaigns.sweep import CASE, Setting, settled, sweep_products
 from conespot.results.expectation import Expectations
 from conespot.scene import InputError, Scene
 from conespot.scene.document import Document, Path_, find_document, is_file, merge, read_document, read_value
@@ -24,14 +23,11 @@ from conespot.scene.scene import expand
 from conespot.scene.text_file import at_home
 from conespot.scene.trajectory import AnyTrajectory, Box
 
-MAX_COMBINATIONS = 10_000
 #: named in the file by a word alone, which stands for a mapping with this key
 _WORDS = {"scene": "preset", "trajectory": "kind"}
 #: keys whose value may be a file's name
 _FILES = ("file", "preset", "scene")
-_CASE = ("scene", "trajectory", "poses", "localizers", "knowledge", "samples", "edge_samples")
-_FRAMES = (*_CASE, "bounds", "frames", "sweep")
-_SWEPT = (*_CASE, "seed")
+_FRAMES = (*CASE, "bounds", "frames", "sweep")
 
 
 def _known_localizer(value: Any) -> Any:
@@ -78,18 +74,8 @@ class Campaign(Model):
 
 
 @dataclass(frozen=True)
-class Axis:
-    """A swept key: its dotted `key`, that path in the campaign, its `items`, and where the list stands in the file."""
-
-    key: str
-    path: tuple[str, ...]
-    items: list[Any]
-    at: Path_
-
-
-@dataclass(frozen=True)
 class Combination:
-    """One combination of what is swept: the campaign, its file as if nothing were, and the items `chosen` by key."""
+    """One combination of what is swept: the campaign, its file as if nothing were, and what is `chosen` by key."""
 
     campaign: Campaign
     document: Document
@@ -111,6 +97,11 @@ def override(document: Document, key: str, text: str, option: str) -> Document:
     path = tuple(key.split("."))
     value = _from_here(path[-1], read_value(text, option))
     sweep = document.data.get("sweep", {})
+
+    def laid(key: str, item: Any) -> Any:
+        axis = tuple(key.split("."))
+        return _value_at(lay(lay({}, axis, item), path, value), axis)
+
     if path[0] == "sweep":
         if not isinstance(sweep, dict):
             raise InputError(f"{option}: the sweep is a list of products; change it in a copy of {document.source}")
@@ -119,9 +110,9 @@ def override(document: Document, key: str, text: str, option: str) -> Document:
     else:
         at, data = path, lay(document.data, path, value)
         if isinstance(sweep, dict) and sweep:
-            data["sweep"] = _settled(sweep, path, value)
+            data["sweep"] = settled(sweep, path, laid)
         elif isinstance(sweep, list):
-            data["sweep"] = [_settled(p, path, value) if isinstance(p, dict) else p for p in sweep]
+            data["sweep"] = [settled(p, path, laid) if isinstance(p, dict) else p for p in sweep]
     kept = {k: v for k, v in document.lines.items() if k[: len(at)] != at}
     return replace(document, data=data, lines={**kept, at: option})
 
@@ -145,19 +136,6 @@ def _from_here(key: str, value: Any) -> Any:
     return value
 
 
-def _settled(product: dict[str, Any], path: tuple[str, ...], value: Any) -> dict[str, Any]:
-    """A product without the axes that `path` settles, and with `value` laid on the items of those above it."""
-    settled: dict[str, Any] = {}
-    for key, items in product.items():
-        axis = tuple(key.split("."))
-        if axis[: len(path)] == path:
-            continue
-        if path[: len(axis)] == axis and isinstance(items, list):
-            items = [_value_at(lay(lay({}, axis, item), path, value), axis) for item in items]
-        settled[key] = items
-    return settled
-
-
 def lay(data: dict[str, Any], path: tuple[str, ...], value: Any) -> dict[str, Any]:
     """`data` with `value` laid on it at `path`: mappings are merged, everything else is replaced."""
     nested = value
@@ -177,37 +155,10 @@ def _value_at(data: Any, path: tuple[str, ...]) -> Any:
     return data
 
 
-def sweep_products(document: Document) -> list[list[Axis]]:
-    """The axes of every Cartesian product under `sweep` (one mapping, or a list of them). Raises InputError."""
-    sweep = document.data.get("sweep", {})
-    listed = isinstance(sweep, list)
-    products, count = [], 0
-    for j, product in enumerate(sweep if listed else [sweep]):
-        at: Path_ = ("sweep", j) if listed else ("sweep",)
-        if not isinstance(product, dict):
-            raise InputError(f"{document.place(at)}: sweep: must hold lines of `key: [values]`, got {product!r}")
-        axes = []
-        for key, items in product.items():
-            where = document.place((*at, key))
-            root = key.split(".")[0]
-            if root not in _SWEPT:
-                near = difflib.get_close_matches(root, _SWEPT, n=1)
-                hint = f"did you mean '{near[0]}'?" if near else f"what can be: {', '.join(_SWEPT)}"
-                raise InputError(f"{where}: sweep: '{root}' cannot be swept; {hint}")
-            if not isinstance(items, list) or not items:
-                raise InputError(f"{where}: sweep.{key}: must be a list of values, got {items!r}")
-            axes.append(Axis(key, tuple(key.split(".")), items, (*at, key)))
-        products.append(axes)
-        count += math.prod(len(axis.items) for axis in axes)
-        if count > MAX_COMBINATIONS:
-            raise InputError(f"{document.place(at)}: sweep: more than {MAX_COMBINATIONS} combinations; sweep over less")
-    return products or [[]]
-
-
 def makes_frames(document: Document) -> bool:
     """False for theory alone. Raises InputError for a campaign that wants frames without a scene, or nothing."""
     data = document.data
-    if "scene" in data or any(axis.path[0] == "scene" for axes in sweep_products(document) for axis in axes):
+    if "scene" in data or any(setting.path[0] == "scene" for setting in _swept(document)):
         return True
     if not data.get("theory") or any(key in data for key in _FRAMES):
         raise InputError(f"{document.source}: scene: is required but missing; `scene: paper-code` is a good start")
@@ -226,12 +177,12 @@ def combinations(document: Document) -> Iterator[Combination]:
     """
     unswept = _unswept(document)
     for axes in sweep_products(document):
-        for picks in itertools.product(*(range(len(axis.items)) for axis in axes)):
+        for choices in itertools.product(*(axis.choices for axis in axes)):
             laid = unswept
-            chosen = {axis.key: axis.items[i] for axis, i in zip(axes, picks, strict=True)}
+            chosen = {axis.key: choice.label for axis, choice in zip(axes, choices, strict=True)}
             # what lies within another swept key is laid on that one's value, in whatever order they stand
-            for axis, i in sorted(zip(axes, picks, strict=True), key=lambda pick: len(pick[0].path)):
-                laid = _picked(laid, axis, i)
+            for setting in sorted((s for choice in choices for s in choice.settings), key=lambda s: len(s.path)):
+                laid = _set(laid, setting)
             try:
                 yield Combination(_expanded(laid).validate(Campaign), laid, chosen)
             except InputError as error:
@@ -239,17 +190,25 @@ def combinations(document: Document) -> Iterator[Combination]:
                 raise InputError(f"{error} (in the combination {which})" if len(axes) > 1 else str(error)) from None
 
 
+def _swept(document: Document) -> Iterator[Setting]:
+    """Everything that some combination settles."""
+    for axes in sweep_products(document):
+        for axis in axes:
+            for choice in axis.choices:
+                yield from choice.settings
+
+
 def _unswept(document: Document) -> Document:
     return replace(document, data={k: v for k, v in document.data.items() if k != "sweep"})
 
 
-def _picked(document: Document, axis: Axis, i: int) -> Document:
-    item = (*axis.at, i)
-    lines = {k: v for k, v in document.lines.items() if k[: len(axis.path)] != axis.path}
-    # without sweep the file was valid, so this item is to blame for whatever is wrong around it
-    lines |= {axis.path[:n]: document.place(item) for n in range(1, len(axis.path) + 1)}
-    lines |= {axis.path + k[len(item) :]: v for k, v in document.lines.items() if k[: len(item)] == item}
-    return replace(document, data=lay(document.data, axis.path, axis.items[i]), lines=lines)
+def _set(document: Document, setting: Setting) -> Document:
+    path, at = setting.path, setting.at
+    lines = {k: v for k, v in document.lines.items() if k[: len(path)] != path}
+    # without sweep the file was valid, so this value is to blame for whatever is wrong around it
+    lines |= {path[:n]: document.place(at) for n in range(1, len(path) + 1)}
+    lines |= {path + k[len(at) :]: v for k, v in document.lines.items() if k[: len(at)] == at}
+    return replace(document, data=lay(document.data, path, setting.value), lines=lines)
 
 
 def _expanded(document: Document) -> Document:
@@ -266,7 +225,7 @@ def resolved(document: Document, made_with: dict[str, str]) -> dict[str, Any]:
     campaign = base(document)
     data = campaign.model_copy(update={"made_with": made_with}).model_dump(mode="json")
     sweep = document.data.get("sweep")
-    paths = [axis.path for axes in sweep_products(document) for axis in axes]
+    paths = {setting.path for setting in _swept(document)}
     if not makes_frames(document):
         return {key: value for key, value in data.items() if key not in _FRAMES}
     if ("scene",) in paths or ("scene", "preset") in paths:

@@ -3,7 +3,8 @@
 import pytest
 
 from conespot.campaigns.plan import make_plan
-from conespot.campaigns.schema import MAX_COMBINATIONS, base, combinations, override, read_campaign, resolved
+from conespot.campaigns.schema import base, combinations, override, read_campaign, resolved
+from conespot.campaigns.sweep import MAX_COMBINATIONS
 from conespot.scene import InputError
 from conespot.scene.document import dump, shipped
 
