@@ -52,14 +52,15 @@ class RetinalExposure:
 
     @property
     def sentence(self) -> str:
-        """One line for a plan or a report, with its label."""
+        """One line for a plan or a report of a scene's exposure, with its label."""
         minutes = self.seconds_to_dose / 60.0
         dose = f"{PHOTOCHEMICAL_DOSE / 1e4:.2g} J/cm2 A-weighted"
         time = f"{dose} after {minutes:.3g} min, half of it after {minutes / 2.0:.3g}"
         if math.isinf(minutes):
             time = "no A-weighted light"
         return (
-            f"peak retinal irradiance {self.irradiance / 10.0:.3g} mW/cm2; A-weighted {self.photochemical / 10.0:.3g} "
+            f"peak retinal irradiance, microscope included, {self.irradiance / 10.0:.3g} mW/cm2; "
+            f"A-weighted {self.photochemical / 10.0:.3g} "
             f"mW/cm2 ({self.photochemical_ratio:.3g} x limit), R-weighted {self.thermal / 10.0:.3g} mW/cm2 "
             f"({self.thermal_ratio:.3g} x limit); {time} ({LABEL})"
         )

@@ -102,6 +102,7 @@ def test_a_metered_camera_exposes_alike_on_every_worker(tmp_path):
     assert (pd.read_csv(runs[0] / "errors.csv")["status"] == "ok").any()
 
 
+@pytest.mark.slow
 def test_an_interrupted_and_a_killed_run_go_on_to_the_same_bytes(folder, straight):
     """Ctrl-C after one pose, kill -9 after another with a torn line behind it, then to the end."""
     run = folder / "broken"
@@ -191,6 +192,7 @@ def test_one_pose_of_no_case_is_refused(straight, capsys, case, pose, says):
     assert says in capsys.readouterr().err
 
 
+@pytest.mark.slow
 def test_frames_are_kept_when_asked_for(folder):
     options = ["--poses", 1, "--set", "frames=true", "--set", "sweep={}", "--resolution", 100, "--out", "kept"]
     done = campaign("run", "c.yaml", "--workers", 1, *options, cwd=folder)

@@ -74,7 +74,7 @@ def measured(site: str) -> tuple[np.ndarray, np.ndarray]:
     return np.array([float(r["wavelength_nm"]) for r in rows]), np.array([float(r[f"{site}_pct"]) for r in rows])
 
 
-@pytest.mark.parametrize("site", ["nasal", "perifovea", "fovea"])
+@pytest.mark.parametrize("site", ["perifovea", *(pytest.param(s, marks=pytest.mark.slow) for s in ("nasal", "fovea"))])
 def test_rendered_sites_follow_delori_and_pflibsen(site):
     """Rendered reflectance behind a phakic lens; against Table I at 18 to 20 wavelengths; rms within 6 %."""
     wavelengths, percent = measured(site)
@@ -175,6 +175,7 @@ def test_a_pupil_lets_light_escape():
     assert means[1] / means[0] == pytest.approx((1 - 0.5) / (1 - 0.5 * (1 - share)), rel=0.01)
 
 
+@pytest.mark.slow
 def test_a_glint_adds_light_near_the_mirror_direction_only():
     """A fundus with a glint in light along the camera's axis; against none: brighter at the pole, equal at the rim."""
     light = LIGHTS["line532"]

@@ -62,6 +62,7 @@ def test_what_stays_and_the_square_of_what_passes_make_up_the_whole_reflectance(
     assert local[3].mean() < 0.5 * whole[3].mean()
 
 
+@pytest.mark.slow
 def test_a_narrow_beam_spreads_as_the_table_says(even_maps):
     """Rendered at 850 nm over an even fundus: flux between radii, against the table's share of t2 times the beam's.
 

@@ -114,7 +114,7 @@ def test_a_unit_whose_worker_dies_is_tried_once_more(plan, tmp_path):
     ]
 
 
-@pytest.mark.parametrize("workers", [1, 2])
+@pytest.mark.parametrize("workers", [2, pytest.param(1, marks=pytest.mark.slow)])
 @pytest.mark.parametrize(
     ("how", "says"), [("dies", "was killed by SIGKILL (out of memory?)"), ("exits", "ended with exit code 3")]
 )

@@ -88,6 +88,7 @@ def finished(folder, plan):
         return set(Journal(journal, plan, stream).entries)
 
 
+@pytest.mark.slow
 def test_killed_at_fifty_moments_nothing_is_lost_or_run_twice(tmp_path, document, undisturbed):
     """kill -9 of the process that owns the journal, after one to eight poses more, or while it writes rows."""
     folder, plan, moment = tmp_path / "run", make_plan(document), random.Random(1)

@@ -70,6 +70,7 @@ def fitted(scene, pose, believed=None):
     return fit_outline(pixels, believed or scene, knowns=FREE, robust=False)
 
 
+@pytest.mark.slow
 @settings(max_examples=100, deadline=None)
 @given(
     name=st.sampled_from(list(SURFACES)),

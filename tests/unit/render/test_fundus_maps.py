@@ -92,6 +92,7 @@ def test_vessels_can_be_left_out():
     assert maps.vein.max() == 0.0
 
 
+@pytest.mark.slow
 def test_band_reflectance_is_the_weighted_mean():
     """Reflectance in an IR LED's band at 16 wavelengths; against 200 of them; within 0.3 %."""
     retina, weight = Fundus(), LIGHTS["ir850"].spectrum

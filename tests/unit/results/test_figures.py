@@ -169,6 +169,7 @@ def test_the_same_rows_give_the_same_bytes(tmp_path, plan, make_rows):
     assert ET.fromstring(svg).tag.endswith("svg")
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(not hasattr(os, "sched_getaffinity"), reason="figures are drawn on one core where nothing forks")
 def test_figures_are_the_same_on_one_core_and_on_several_of_which_one_fails(tmp_path, plan, make_rows, monkeypatch):
     drawings = plan(make_rows(poses=6, powers=(0.1, 1.0)))

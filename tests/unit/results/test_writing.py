@@ -49,6 +49,7 @@ def test_a_run_folder_gets_every_file_and_no_other(written):
     assert all(path.stat().st_size > 0 for path in files)
 
 
+@pytest.mark.slow
 def test_somebody_elses_copy_with_csv_rows_gives_the_same_bytes(written, tmp_path):
     folder, files = written
     pd.read_parquet(folder / "errors.parquet").to_csv(tmp_path / "errors.csv", index=False)
