@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any, assert_never
 
 from conespot.campaigns.ending import RunError
 from conespot.campaigns.profile import Jobs, LocalMachine, Profile, Scheduler, Tls
-from conespot.campaigns.worker import held_back
+from conespot.campaigns.worker import born
 from conespot.render.kernel import VARIANT_OVERRIDE
 from conespot.scene import InputError
 
@@ -26,11 +26,12 @@ if TYPE_CHECKING:
 #: how long a scheduler may take to answer first [s]
 _PATIENCE = 20
 #: what we ask of a scheduler that we start ourselves: a worker that is lost is our affair at once, a silent one after
-#: a minute, and logs are for those who look for them
+#: a minute, one that is replaced imports nothing from the working folder, and logs are for those who look for them
 _SETTINGS = {
     "distributed.scheduler.allowed-failures": 0,
     "distributed.scheduler.worker-ttl": "60s",
     "distributed.worker.memory.terminate": 0.95,
+    "distributed.nanny.pre-spawn-environ.PYTHONSAFEPATH": "1",
     "distributed.admin.low-level-log-length": 0,
 }
 _CLUSTERS = {
@@ -92,7 +93,7 @@ def _started(profile: LocalMachine | Jobs) -> Iterator[object]:
 
     # workers are processes of one thread with a nanny each, which replaces them; whom its thread starts, now or later,
     # never hears of Ctrl-C
-    with held_back():
+    with born():
         cluster = LocalCluster(
             n_workers=profile.workers,
             threads_per_worker=1,
@@ -111,7 +112,8 @@ def _submitter(profile: Jobs) -> JobQueueCluster:
     """A scheduler in this process that submits jobs; none yet."""
     with _installed():
         import dask_jobqueue
-    prologue = list(profile.job_script_prologue)
+    # a job begins in the folder where it was submitted, whose files are no modules of its worker
+    prologue = [*profile.job_script_prologue, "export PYTHONSAFEPATH=1"]
     if profile.variant:
         prologue.append(f"export {VARIANT_OVERRIDE}={profile.variant}")
     options: dict[str, Any] = {

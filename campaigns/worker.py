@@ -105,7 +105,7 @@ class Worker:
         self.took = math.inf
         self._begun = time.monotonic()
         self._process = context.Process(target=_work, args=(theirs, plan, frames, make), daemon=True)
-        with _born():
+        with born():
             self._process.start()
         theirs.close()
 
@@ -205,7 +205,7 @@ def _sentence(error: BaseException) -> str:
 
 
 @contextlib.contextmanager
-def _born() -> Iterator[None]:
+def born() -> Iterator[None]:
     """Processes started meanwhile use one thread, import nothing of ours or the standard library's from the working
     folder, and never hear of Ctrl-C: all must be so before they run anything.
     """

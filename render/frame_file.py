@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import secrets
 from collections.abc import Mapping
 from pathlib import Path
@@ -68,12 +69,12 @@ def write_frame(path: Path, radiance: NDArray[np.float32], header: Mapping[str, 
 
     names = _labels(radiance.shape[-1])
     channels = {name: np.ascontiguousarray(radiance[..., i]) for i, name in enumerate(names)}
-    # OpenEXR writes to a path only, so the file is made beside its place and renamed
+    # OpenEXR writes to a path only, in bytes to one of any encoding, so the file is made beside its place and renamed
     temporary = path.with_name(f".{secrets.token_hex(4)}.exr")
     attributes: dict[str, object] = {"compression": OpenEXR.ZIP_COMPRESSION, "type": OpenEXR.scanlineimage, **header}
     try:
         with OpenEXR.File(attributes, channels) as file:
-            file.write(str(temporary))
+            file.write(os.fsencode(temporary))
         temporary.replace(path)
     except (OSError, RuntimeError) as error:
         temporary.unlink(missing_ok=True)
@@ -90,7 +91,7 @@ def read_frame(path: Path) -> tuple[NDArray[np.float32], dict[str, object]]:
     if not path.is_file():
         raise InputError(f"{path}: cannot be read as a conespot frame: no such file")
     try:
-        with OpenEXR.File(str(path), header_only=True) as file:
+        with OpenEXR.File(os.fsencode(path), header_only=True) as file:
             if len(file.parts) != 1:
                 raise ValueError("it holds several images")
             low, high = (np.asarray(corner, float) for corner in file.header()["dataWindow"])
@@ -100,7 +101,7 @@ def read_frame(path: Path) -> tuple[NDArray[np.float32], dict[str, object]]:
             raise ValueError(f"{width} x {height} px of {channels} channels are no camera's")
         if width * height * channels > _MOST_SAMPLES * max(1, path.stat().st_size):
             raise ValueError(f"{path.stat().st_size} bytes cannot hold {width} x {height} px of {channels} channels")
-        with OpenEXR.File(str(path), separate_channels=True) as file:
+        with OpenEXR.File(os.fsencode(path), separate_channels=True) as file:
             header, found = dict(file.header()), file.channels()
             names = ["Y"] if "Y" in found else [f"C{i}" for i in range(len(found))]
             radiance = np.stack([found[name].pixels for name in names], axis=-1).astype(np.float32)

@@ -94,7 +94,8 @@ def read_table(path: Path, max_rows: int, text: Sequence[str] = ()) -> pa.Table:
         if path.stat().st_size > _MAX_BYTES:
             raise InputError(f"{path}: larger than {_MAX_BYTES // 1_000_000} MB, which no run's rows need")
         if path.suffix == ".parquet":
-            with pa.parquet.ParquetFile(path) as file:
+            # Arrow opens no path that is not UTF-8
+            with path.open("rb") as stream, pa.parquet.ParquetFile(stream) as file:
                 meta = file.metadata
                 inflated = sum(meta.row_group(i).total_byte_size for i in range(meta.num_row_groups))
                 _bound(path, meta.num_rows, meta.num_columns, max_rows)
@@ -117,9 +118,11 @@ def read_table(path: Path, max_rows: int, text: Sequence[str] = ()) -> pa.Table:
 def _read_csv(path: Path, text: Sequence[str]) -> pa.Table:
     with path.open("rb") as stream:
         header = pa.csv.read_csv(pa.py_buffer(stream.readline(100_000))).column_names
-    types = {name: pa.string() if name in text or "." in name else pa.float64() for name in header}
-    options = pa.csv.ConvertOptions(column_types=types, null_values=["", "nan", "NaN"], strings_can_be_null=False)
-    return pa.csv.read_csv(path, parse_options=pa.csv.ParseOptions(newlines_in_values=True), convert_options=options)
+        types = {name: pa.string() if name in text or "." in name else pa.float64() for name in header}
+        options = pa.csv.ConvertOptions(column_types=types, null_values=["", "nan", "NaN"], strings_can_be_null=False)
+        parsing = pa.csv.ParseOptions(newlines_in_values=True)
+        stream.seek(0)
+        return pa.csv.read_csv(stream, parse_options=parsing, convert_options=options)
 
 
 def _bound(path: Path, rows: int, columns: int, max_rows: int) -> None:
