@@ -12,6 +12,8 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import IO
 
+from conespot.campaigns.plain_file import open_plain
+
 #: `is_taken` holds the lock for a moment, which is not to keep a run from beginning [s]
 _PATIENCE, _STEP = 0.5, 0.05
 
@@ -28,7 +30,7 @@ def take(file: IO[bytes]) -> bool:
 
 def is_taken(path: Path) -> bool:
     """Whether a process has locked a file. Raises OSError if it cannot be read."""
-    with path.open("rb") as file:
+    with open_plain(path) as file:
         return not _flock(file.fileno(), "LOCK_SH", "LOCK_NB")
 
 

@@ -9,6 +9,7 @@ from pathlib import Path
 
 from conespot.campaigns.arrival import keep_frames
 from conespot.campaigns.journal import FILE, Journal
+from conespot.campaigns.plain_file import open_plain
 from conespot.campaigns.plan import Plan, make_plan
 from conespot.campaigns.row import Record
 from conespot.campaigns.schema import read_campaign
@@ -82,10 +83,10 @@ def _records(folder: Path, plan: Plan) -> tuple[list[str], Iterator[Record]]:
     """The damage of a journal, and its records one after the other."""
 
     def read() -> Iterator[Record]:
-        with open(folder / FILE, "rb") as stream:
+        with open_plain(folder / FILE) as stream:
             yield from Journal(folder / FILE, plan, stream).records()
 
-    with open(folder / FILE, "rb") as stream:
+    with open_plain(folder / FILE) as stream:
         return Journal(folder / FILE, plan, stream).damage, read()
 
 

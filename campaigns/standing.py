@@ -18,6 +18,7 @@ from pydantic import Field, FiniteFloat, TypeAdapter, ValidationError
 from conespot.campaigns.journal import FILE as JOURNAL
 from conespot.campaigns.journal import Entry, whole_lines
 from conespot.campaigns.lock import is_taken
+from conespot.campaigns.plain_file import open_plain
 from conespot.campaigns.row import Stated
 from conespot.scene import InputError
 from conespot.scene.model import Model
@@ -130,7 +131,7 @@ _LINE = TypeAdapter(_Line)
 def _glance(journal: Path) -> Mapping[str, Entry]:
     """The units of a journal, without asking whether they are those of its campaign."""
     entries: dict[str, Entry] = {}
-    with journal.open("rb") as stream:
+    with open_plain(journal) as stream:
         for body in whole_lines(stream):
             try:
                 line = _LINE.validate_json(body)
@@ -144,9 +145,9 @@ def _glance(journal: Path) -> Mapping[str, Entry]:
 def _read(path: Path) -> Standing | None:
     """A kept count; None for one that is not there or is none."""
     try:
-        with path.open("rb") as stream:
+        with open_plain(path) as stream:
             return Standing.model_validate_json(stream.read(_MOST_BYTES))
-    except (FileNotFoundError, ValidationError):
+    except (OSError, ValidationError):
         return None
 
 

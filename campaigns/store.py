@@ -17,6 +17,7 @@ from conespot.campaigns.ending import RunError
 from conespot.campaigns.journal import FILE, Entry, Journal
 from conespot.campaigns.lock import take
 from conespot.campaigns.maker import made_with, maker
+from conespot.campaigns.plain_file import open_plain
 from conespot.campaigns.plan import Plan
 from conespot.campaigns.row import Record, Stated
 from conespot.campaigns.row_table import row_table
@@ -112,7 +113,7 @@ def open_store(folder: Path, plan: Plan, document: Document) -> Iterator[Store]:
     try:
         _refuse_strangers(folder)
         folder.mkdir(parents=True, exist_ok=True)
-        journal = open(folder / FILE, "a+b")  # noqa: SIM115 - it must outlive this function
+        journal = open_plain(folder / FILE, "a+b")
     except OSError as error:
         raise InputError(f"{folder}: cannot be written: {error.strerror}; choose another --out") from None
     with journal:
@@ -143,7 +144,7 @@ def open_store(folder: Path, plan: Plan, document: Document) -> Iterator[Store]:
 def look_into(folder: Path, plan: Plan) -> Iterator[Store]:
     """The store of a run as it is now, which another process may work on meanwhile; nothing can be appended."""
     try:
-        stream = open(folder / FILE, "rb")  # noqa: SIM115 - as above
+        stream = open_plain(folder / FILE)
     except OSError as error:
         raise InputError(f"{folder / FILE}: cannot be read: {error.strerror}") from None
     with stream:
