@@ -159,7 +159,7 @@ def test_a_signal_before_there_is_a_loop_ends_the_command_in_a_sentence(number):
         f"signal.signal({int(number)}, signal.SIG_DFL)\n"
         "from conespot.campaigns import command\n"
         "assert not {'argparse', 'conespot.scene', 'numpy'} & set(sys.modules)\n"
-        f"command._parser = lambda: os.kill(os.getpid(), {int(number)})\n"
+        f"command._options = lambda arguments: os.kill(os.getpid(), {int(number)})\n"
         "command.main()\n"
     )
     done = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, timeout=300)

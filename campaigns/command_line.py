@@ -1,0 +1,96 @@
+"""The command line of `campaign`: its commands and their options. What they do is in `campaigns.subcommands`."""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Callable
+from pathlib import Path
+
+from conespot.campaigns import subcommands
+from conespot.campaigns.ending import Ending
+from conespot.campaigns.machines import add_machines
+from conespot.campaigns.settings import add_set, add_settings
+
+#: adds the command that a function does, called as it is, with what it says of itself
+_Add = Callable[[Callable[[argparse.Namespace], Ending], str], argparse.ArgumentParser]
+
+
+def parser() -> argparse.ArgumentParser:
+    """The commands of `campaign` and their options; what is parsed says in `run` who does it."""
+    line = argparse.ArgumentParser(
+        prog="campaign",
+        description="Render spotlights on a retina, localize the instrument that carries them, compare with the truth.",
+        epilog="exit codes: 0 done, 1 something failed, 2 bad input, 130 interrupted",
+    )
+    commands = line.add_subparsers(required=True, metavar="COMMAND")
+
+    def add(run: Callable[[argparse.Namespace], Ending], text: str) -> argparse.ArgumentParser:
+        command = commands.add_parser(run.__name__, help=text, description=f"{text[0].upper()}{text[1:]}.")
+        command.set_defaults(run=run)
+        return command
+
+    _add_campaigns(add)
+    _add_runs(add)
+    _add_results(add)
+    doctor = add(subcommands.doctor, "say what this machine renders with, and prove it")
+    doctor.add_argument("--clear-cache", action="store_true", help="remove the backgrounds kept between runs instead")
+    return line
+
+
+def _add_campaigns(add: _Add) -> None:
+    """What begins with a campaign or a scene."""
+    run = add(subcommands.run, "render, localize and compare; an interrupted run is continued")
+    plan = add(subcommands.plan, "say what a run would do")
+    validate = add(subcommands.validate, "check a campaign and every combination it sweeps over")
+    theory = add(subcommands.theory, "say how well a scene could be localized: bounds, error budget, design guidance")
+    theory.add_argument("scene", nargs="?", default="paper-code", help="a preset or a YAML file (default: paper-code)")
+    for command in (run, plan, validate, theory):
+        if command is not theory:
+            command.add_argument("campaign", help="a YAML file, or the name of a shipped campaign")
+        add_set(command)
+    for command in (run, plan, validate):
+        add_settings(command)
+    run.add_argument("--dry-run", action="store_true", help="only say what the run would do")
+    run.add_argument("--out", metavar="FOLDER", help="the run folder (default: runs/NAME)")
+    run.add_argument("--shard", metavar="I/N", help="only this share of the poses, into a folder that `merge` reads")
+    theory.add_argument("--out", metavar="FOLDER", help="where to write (default: runs/theory-SCENE)")
+    for command in (run, plan):
+        add_machines(command)
+    run.add_argument("--log", metavar="FILE", type=Path, help="append what happens to a file, a JSON object a line")
+    listed = add(subcommands.list, "list the shipped campaigns")
+    listed.add_argument("--localizers", action="store_true", help="list the localizers in their place")
+    add(subcommands.show, "print a campaign's file").add_argument("campaign")
+
+
+def _add_runs(add: _Add) -> None:
+    """What looks at a run, or goes on with it."""
+    status = add(subcommands.status, "say how far a run is, while it goes or after, and why poses failed")
+    status.add_argument("folder", type=Path, metavar="RUN")
+    retry = add(subcommands.retry, "run poses of a run again, such as: campaign retry runs/power_sweep --failed")
+    retry.add_argument("folder", type=Path, metavar="RUN")
+    which = retry.add_mutually_exclusive_group(required=True)
+    which.add_argument("--failed", action="store_true", help="those that were lost to an error")
+    which.add_argument("--reason", metavar="TEXT", help="those with a frame that failed for a reason that holds TEXT")
+    add_machines(retry)
+    retry.add_argument("--log", metavar="FILE", type=Path, help="as for run")
+    report = add(subcommands.report, "make the tables, figures and report of a run folder again")
+    report.add_argument("folder", type=Path, metavar="RUN")
+
+
+def _add_results(add: _Add) -> None:
+    """What compares, or looks into, what was found."""
+    merge = add(subcommands.merge, "make one run folder of those of a campaign's shards")
+    merge.add_argument("out", type=Path, metavar="OUT")
+    merge.add_argument("folders", type=Path, nargs="+", metavar="SHARD")
+    compare = add(subcommands.compare, "compare two lights pose by pose, in one run or several")
+    compare.add_argument("folders", type=Path, nargs="+", metavar="RUN")
+    compare.add_argument("--lights", metavar="A,B", help="reference and other light (default: the first against all)")
+    check = add(subcommands.check, "compare a run with what its campaign expects (`expect:`); exit code 1 for a miss")
+    check.add_argument("folder", type=Path, metavar="RUN")
+    check.add_argument("--campaign", metavar="FILE", help="expect what this campaign does (default: the run's own)")
+    check.add_argument("--junit", type=Path, metavar="FILE", help="write the verdicts as JUnit XML")
+    check.add_argument("--markdown", type=Path, metavar="FILE", help="write the verdicts as a markdown table")
+    debug = add(subcommands.debug, "render one pose of a run again, and draw what its localizers saw")
+    debug.add_argument("folder", type=Path, metavar="RUN")
+    debug.add_argument("case", metavar="CASE", help="its key, the beginning of it, or its line in cases.jsonl")
+    debug.add_argument("pose", type=int, metavar="POSE", help="its number, as in errors.csv")
