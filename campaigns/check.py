@@ -35,9 +35,9 @@ def check_run(folder: Path, campaign: str | None, junit_file: Path | None, markd
         raise InputError(f"{document.source}: expect: nothing is expected; --campaign FILE names a file that does")
     table = verdict_table(verdicts)
     if junit_file is not None:
-        write_atomically(junit_file, junit(run.name, verdicts))
+        write_atomically(junit_file, junit(run.name, verdicts), "--junit")
     if markdown_file is not None:
-        write_atomically(markdown_file, table.markdown().encode())
+        write_atomically(markdown_file, table.markdown().encode(), "--markdown")
     unclear = [(i, v) for i, v in enumerate(verdicts) if v.unclear]
     if unclear:
         i, first = unclear[0]

@@ -14,7 +14,7 @@ import re
 import sys
 import zlib
 from collections import Counter
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from typing import IO
@@ -71,8 +71,17 @@ class Journal:
         self._whole = True  #: the file ends with a line's end
         self._read()
 
-    def append(self, record: Record) -> None:
-        """Write a finished unit: it is on the disk when this returns. Raises OSError."""
+    def append(self, records: Iterable[Record]) -> None:
+        """Write finished units: they are on the disk when this returns. Raises OSError."""
+        fresh: dict[str, Entry] = {}
+        for record in records:
+            length = self._write(record)
+            fresh[record.unit] = self._entry(record, self.size - length, length)
+        os.fsync(self._stream.fileno())
+        self.entries.update(fresh)
+
+    def _write(self, record: Record) -> int:
+        """Write a line; its length."""
         line, file = encode(record), self._stream.fileno()
         # a line that was torn ends here, so that this one begins its own
         data = line if self._whole else b"\n" + line
@@ -82,8 +91,7 @@ class Journal:
                 written += os.write(file, data[written:])
         finally:
             self._whole = written == len(data) or (self._whole and not written)
-        os.fsync(file)
-        self._keep(record, self.size - len(line), len(line))
+        return len(line)
 
     def record(self, unit: str) -> Record:
         """The record of a finished unit, read again. Raises KeyError for one that is not finished."""
@@ -129,7 +137,7 @@ class Journal:
             return str(error)
         if not self._planned(record):
             return "is no pose of this campaign"
-        self._keep(record, offset, len(line))
+        self.entries[record.unit] = self._entry(record, offset, len(line))
         return None
 
     def _planned(self, record: Record) -> bool:
@@ -138,12 +146,12 @@ class Journal:
         known = pose.isdecimal() and str(int(pose)) == pose and int(pose) < count
         return known and (bool(record.error) or Counter((f.case, f.localizer) for f in record.findings) == answers)
 
-    def _keep(self, record: Record, offset: int, length: int) -> None:
+    def _entry(self, record: Record, offset: int, length: int) -> Entry:
         reasons = tuple(sys.intern(found.reason) for found in record.findings if found.reason)
         stated = Stated.among(record.findings)
         stated = self._stated.setdefault(stated, stated)  # one of each kind is enough
         error, by, answers = sys.intern(record.error), sys.intern(record.by), len(record.findings)
-        self.entries[record.unit] = Entry(offset, length, error, by, answers, reasons, stated)
+        return Entry(offset, length, error, by, answers, reasons, stated)
 
 
 def encode(record: Record) -> bytes:

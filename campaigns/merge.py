@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import hashlib
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
@@ -9,6 +10,7 @@ from pathlib import Path
 
 from conespot.campaigns.arrival import keep_frames
 from conespot.campaigns.journal import FILE, Journal
+from conespot.campaigns.lock import alone
 from conespot.campaigns.plain_file import open_plain
 from conespot.campaigns.plan import Plan, make_plan
 from conespot.campaigns.row import Record
@@ -54,11 +56,11 @@ def merge(out: Path, folders: Sequence[Path]) -> Merged:
         for folder in folders:
             damage += _compare(folder, plan, found)
         for folder in folders:
-            for record in _records(folder, plan)[1]:
-                if not record.error and (record.unit not in store.entries or store.entries[record.unit].error):
-                    store.append(record)
+            with _journal(folder, plan) as journal:
+                store.extend(record for record in journal.records() if not record.error and _is_left(store, record))
             _copy_frames(folder, store)
-        store.write_rows()
+        with alone(out):
+            store.write_rows()
         left = [unit for unit in plan.units() if unit.key not in store.entries or store.entries[unit.key].error]
     return Merged(out, sum(len(g.positions) for g in plan.groups), tuple(map(plan.says, left)), tuple(damage))
 
@@ -79,32 +81,32 @@ def _refuse_others(folder: Path, plan: Plan) -> None:
         raise InputError(f"{folder}: holds the run of another campaign or other settings than the first folder")
 
 
-def _records(folder: Path, plan: Plan) -> tuple[list[str], Iterator[Record]]:
-    """The damage of a journal, and its records one after the other."""
-
-    def read() -> Iterator[Record]:
-        with open_plain(folder / FILE) as stream:
-            yield from Journal(folder / FILE, plan, stream).records()
-
+@contextlib.contextmanager
+def _journal(folder: Path, plan: Plan) -> Iterator[Journal]:
     with open_plain(folder / FILE) as stream:
-        return Journal(folder / FILE, plan, stream).damage, read()
+        yield Journal(folder / FILE, plan, stream)
+
+
+def _is_left(store: Store, record: Record) -> bool:
+    """Whether the store lacks the record's unit, or lost it."""
+    return record.unit not in store.entries or bool(store.entries[record.unit].error)
 
 
 def _compare(folder: Path, plan: Plan, found: dict[str, tuple[bytes, Path]]) -> list[str]:
     """Add what a folder found to what was `found`; the damage of its journal. Raises InputError if they contradict."""
-    damage, records = _records(folder, plan)
     units = {unit.key: unit for unit in plan.units()}
-    for record in records:
-        if record.error:
-            continue
-        findings = _findings(record)
-        before, where = found.setdefault(record.unit, (findings, folder))
-        if before != findings:
-            raise InputError(
-                f"{where} and {folder}: found different things at {plan.says(units[record.unit])}; they were made with "
-                f"different software or machines ({record.by or 'unknown'}), leave one of them out"
-            )
-    return damage
+    with _journal(folder, plan) as journal:
+        for record in journal.records():
+            if record.error:
+                continue
+            findings = _findings(record)
+            before, where = found.setdefault(record.unit, (findings, folder))
+            if before != findings:
+                raise InputError(
+                    f"{where} and {folder}: found different things at {plan.says(units[record.unit])}; they were made "
+                    f"with different software or machines ({record.by or 'unknown'}), leave one of them out"
+                )
+        return journal.damage
 
 
 def _findings(record: Record) -> bytes:

@@ -14,7 +14,7 @@ from typing import Annotated, Any, Literal
 from pydantic import BeforeValidator, Field
 
 from conespot.campaigns.knowledge import Knowledge
-from conespot.campaigns.sweep import CASE, Setting, settled, sweep_products
+from conespot.campaigns.sweep import CASE, Setting, lines_within_sweep, settled, sweep_products
 from conespot.results.expectation import Expectations
 from conespot.scene import InputError, Scene
 from conespot.scene.document import Document, Path_, find_document, is_file, merge, read_document, read_value
@@ -176,13 +176,14 @@ def combinations(document: Document) -> Iterator[Combination]:
     Raises InputError for the first that is not a campaign, with the line of the swept item that makes it so.
     """
     unswept = _unswept(document)
+    within = lines_within_sweep(document)
     for axes in sweep_products(document):
         for choices in itertools.product(*(axis.choices for axis in axes)):
             laid = unswept
             chosen = {axis.key: choice.label for axis, choice in zip(axes, choices, strict=True)}
             # what lies within another swept key is laid on that one's value, in whatever order they stand
             for setting in sorted((s for choice in choices for s in choice.settings), key=lambda s: len(s.path)):
-                laid = _set(laid, setting)
+                laid = _set(laid, setting, document.place(setting.at), within.get(setting.at, {}))
             try:
                 yield Combination(_expanded(laid).validate(Campaign), laid, chosen)
             except InputError as error:
@@ -199,15 +200,18 @@ def _swept(document: Document) -> Iterator[Setting]:
 
 
 def _unswept(document: Document) -> Document:
-    return replace(document, data={k: v for k, v in document.data.items() if k != "sweep"})
+    """The file without what is swept; every combination has the lines of the others, and only these."""
+    lines = {k: v for k, v in document.lines.items() if k[:1] != ("sweep",) or len(k) == 1}
+    return replace(document, data={k: v for k, v in document.data.items() if k != "sweep"}, lines=lines)
 
 
-def _set(document: Document, setting: Setting) -> Document:
-    path, at = setting.path, setting.at
+def _set(document: Document, setting: Setting, place: str, within: dict[Path_, str]) -> Document:
+    """The file with a setting laid on it that stands at a `place`, with these lines in it."""
+    path = setting.path
     lines = {k: v for k, v in document.lines.items() if k[: len(path)] != path}
     # without sweep the file was valid, so this value is to blame for whatever is wrong around it
-    lines |= {path[:n]: document.place(at) for n in range(1, len(path) + 1)}
-    lines |= {path + k[len(at) :]: v for k, v in document.lines.items() if k[: len(at)] == at}
+    lines |= {path[:n]: place for n in range(1, len(path) + 1)}
+    lines |= {path + k: v for k, v in within.items()}
     return replace(document, data=lay(document.data, path, setting.value), lines=lines)
 
 

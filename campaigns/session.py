@@ -92,8 +92,6 @@ def carry_out(
     `log` is told of each. Raises as `run_campaign` does, but for poses that were lost and for interruptions while poses
     are measured.
     """
-    from conespot.results import write_results
-
     plan = make_plan(document)
     units = shard.units(plan) if shard and plan.cases else list(plan.units())
     name = plan.campaign.name + (f"-{shard.number}-of-{shard.count}" if shard else "")
@@ -108,9 +106,16 @@ def carry_out(
         if plan.campaign.theory:
             _write_theory(folder)
         lost = tuple(entry.error for entry in store.entries.values() if entry.error)
+    finish(folder)
+    return Session(folder, lost)
+
+
+def finish(folder: Path) -> None:
+    """Write tables, figures and report of the rows that a run folder holds. Raises InputError."""
+    from conespot.results import write_results
+
     with alone(folder):
         write_results(folder)
-    return Session(folder, lost)
 
 
 def report(folder: Path) -> None:

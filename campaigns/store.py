@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import contextlib
 import io
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path
 
 from conespot.campaigns.cases import write_cases
@@ -62,15 +62,23 @@ class Store:
 
         What is kept also says who made it: this process, if the record does not say so.
         """
-        record = record if record.by else record.model_copy(update={"by": maker()})
+        record = _signed(record)
         before = self.entries.get(record.unit)
+        self._write([record])
+        self._count.replace(before, self.entries[record.unit])
+        return record
+
+    def extend(self, records: Iterable[Record]) -> None:
+        """Keep many finished units, which the disk is waited for but once. Raises as `append` does."""
+        self._write(map(_signed, records))
+        self._count = Count(self.entries.values())
+
+    def _write(self, records: Iterable[Record]) -> None:
         try:
-            self._journal.append(record)
+            self._journal.append(records)
         except OSError as error:
             reason = f"{self.folder}: cannot be written: {error.strerror}"
             raise RunError(f"{reason}; what is finished is kept, and the same command continues the run") from None
-        self._count.replace(before, self.entries[record.unit])
-        return record
 
     def record(self, unit: str) -> Record:
         """The record of a finished unit. Raises KeyError for one that is not finished."""
@@ -101,6 +109,11 @@ class Store:
         write_atomically(self.folder / "errors.csv", text.getbuffer())
         write_atomically(self.folder / "errors.parquet", packed.getbuffer())
         return len(frame)
+
+
+def _signed(record: Record) -> Record:
+    """The record with who made it: this process, if it does not say so."""
+    return record if record.by else record.model_copy(update={"by": maker()})
 
 
 @contextlib.contextmanager

@@ -94,12 +94,12 @@ def report(options: argparse.Namespace) -> Ending:
 def merge(options: argparse.Namespace) -> Ending:
     """Make one run folder of several."""
     from conespot.campaigns.merge import merge
-    from conespot.results import write_results
+    from conespot.campaigns.session import finish
 
     merged = merge(options.out, options.folders)
     for sentence in merged.damage:
         _fail(sentence, Ending.FAILED)
-    write_results(options.out)
+    finish(options.out)
     _say_results(options.out)
     return _fail(merged.sentence, Ending.FAILED) if merged.missing else Ending.DONE
 

@@ -131,3 +131,13 @@ def _within(key: str, path: tuple[str, ...]) -> bool:
 def _above(key: str, path: tuple[str, ...]) -> bool:
     parts = tuple(key.split("."))
     return len(parts) < len(path) and path[: len(parts)] == parts
+
+
+def lines_within_sweep(document: Document) -> dict[Path_, dict[Path_, str]]:
+    """The lines at and within each part of the sweep, by where that stands: looked up, not sought, by a combination."""
+    within: dict[Path_, dict[Path_, str]] = {}
+    for path, line in document.lines.items():
+        if path[:1] == ("sweep",):
+            for n in range(2, len(path) + 1):
+                within.setdefault(path[:n], {})[path[n:]] = line
+    return within

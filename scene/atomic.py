@@ -9,11 +9,11 @@ from pathlib import Path
 from conespot.scene.document import InputError
 
 
-def write_atomically(path: Path, data: bytes | memoryview) -> None:
+def write_atomically(path: Path, data: bytes | memoryview, option: str = "--out") -> None:
     """Write `data` to `path`: to a temporary file beside it, onto the disk, then renamed over it.
 
     The folder must exist. Whatever happens, `path` holds its old content or all of the new, and no temporary file
-    is left behind by an error. Raises InputError if the file cannot be written.
+    is left behind by an error. Raises InputError if the file cannot be written; `option` is where to name another.
     """
     temporary = path.with_name(f".{path.name[:100]}.{secrets.token_hex(4)}.tmp")
     try:
@@ -30,7 +30,7 @@ def write_atomically(path: Path, data: bytes | memoryview) -> None:
             raise
         _sync_folder(path.parent)
     except OSError as error:
-        raise InputError(f"{path}: cannot be written: {error.strerror}; choose another --out") from None
+        raise InputError(f"{path}: cannot be written: {error.strerror}; choose another {option}") from None
 
 
 def _sync_folder(folder: Path) -> None:

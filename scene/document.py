@@ -249,6 +249,7 @@ def _spelt_out(model: type[BaseModel], key: str, word: str) -> dict[str, Any] | 
     return found.model_dump(mode="json") if isinstance(found, BaseModel) else word
 
 
+@functools.cache
 def shipped(room: str, folder: str) -> dict[str, Path]:
     """The YAML files that come with a room, by name."""
     root = Path(str(resources.files(f"conespot.{room}"))) / folder
