@@ -21,6 +21,7 @@ from conespot.campaigns.plain_file import open_plain
 from conespot.campaigns.plan import Plan
 from conespot.campaigns.row import Record, Stated
 from conespot.campaigns.row_table import row_table
+from conespot.campaigns.row_text import csv_text
 from conespot.campaigns.schema import resolved
 from conespot.campaigns.standing import FILE as STANDING
 from conespot.campaigns.standing import Count, Standing
@@ -103,10 +104,9 @@ class Store:
             return 0
         stated = Stated.by(entry.stated for entry in self.entries.values())
         frame = row_table(self.plan, self.entries, self.record, stated)
-        text, packed = io.BytesIO(), io.BytesIO()
-        frame.to_csv(text, index=False, lineterminator="\n")
+        write_atomically(self.folder / "errors.csv", csv_text(frame))
+        packed = io.BytesIO()
         frame.to_parquet(packed, index=False)
-        write_atomically(self.folder / "errors.csv", text.getbuffer())
         write_atomically(self.folder / "errors.parquet", packed.getbuffer())
         return len(frame)
 

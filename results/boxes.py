@@ -67,11 +67,17 @@ def box_statistics(values: ArrayLike, failed: int = 0) -> dict[str, Any]:
 def box_table(rows: Rows) -> pd.DataFrame:
     """A box of every metric of every group: the group's columns, `metric`, then `STATISTICS`."""
     found: list[dict[str, Any]] = []
-    for key, part in rows.frame.groupby(list(rows.group), sort=True):
-        located = part[part["status"] == "ok"]
+    number = rows.frame.groupby(list(rows.group), sort=True).ngroup().to_numpy()
+    order = np.argsort(number, kind="stable")
+    parts = np.split(order, np.flatnonzero(np.diff(number[order])) + 1)
+    firsts = rows.frame[list(rows.group)].iloc[[part[0] for part in parts]]
+    ok, errors = (rows.frame["status"] == "ok").to_numpy(), rows.frame[list(METRICS)].to_numpy(float)
+    for key, part in zip(firsts.itertuples(index=False, name=None), parts, strict=True):
         setting = dict(zip(rows.group, key, strict=True))
+        located = part[ok[part]]
         failed = len(part) - len(located)
-        found += [{**setting, "metric": name, **box_statistics(located[name], failed)} for name in METRICS]
+        for i, name in enumerate(METRICS):
+            found.append({**setting, "metric": name, **box_statistics(errors[located, i], failed)})
     return pd.DataFrame(found, columns=[*rows.group, "metric", *STATISTICS])
 
 

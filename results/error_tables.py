@@ -17,7 +17,7 @@ from conespot.results.columns import column
 from conespot.results.paper_values import BOTH, NOTES, REFERENCE_POWER_W, STEADY_ABOVE_W, paper_value, purpose
 from conespot.results.run import Run
 from conespot.results.table import Block, Table, number
-from conespot.results.variants import Variant, by_axes, paired
+from conespot.results.variants import AXES, Variant, by_axes, paired
 
 QUANTITIES = {"AE": "mean", "ME": "max"}
 #: the errors that the tables hold, with what they are called
@@ -81,11 +81,14 @@ def cells(run: Run, boxes: pd.DataFrame) -> list[tuple[Variant, _Cells]]:
 
 def _cells(rows: pd.DataFrame, boxes: pd.DataFrame) -> _Cells:
     found: _Cells = {}
-    for (axes, here), (_, stored) in zip(by_axes(rows), by_axes(boxes), strict=True):
+    stored: dict[tuple[Any, ...], list[dict[str, Any]]] = {}
+    for record in boxes[boxes["metric"].isin(list(_METRICS))].to_dict("records"):
+        box = {str(name): value for name, value in record.items()}
+        stored.setdefault(tuple(box[name] for name in AXES), []).append(box)
+    for axes, here in by_axes(rows[[*AXES, "case", "localizer"]]):
         about = pairs(here)
-        for box in stored.to_dict("records"):
-            if box["metric"] in _METRICS:
-                found[Key(metric=box["metric"], **axes)] = Cell({str(name): v for name, v in box.items()}, about)
+        for box in stored[tuple(axes[name] for name in AXES)]:
+            found[Key(metric=box["metric"], **axes)] = Cell(box, about)
     return found
 
 

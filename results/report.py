@@ -16,7 +16,7 @@ from conespot.results.light_exposure import light_exposures
 from conespot.results.paper_values import CITATION
 from conespot.results.run import Run
 from conespot.results.table import Block, Table, number
-from conespot.results.variants import by_axes, ordered, split
+from conespot.results.variants import AXES, by_axes, ordered, split
 
 _MOST_LINES = 300
 _MOST_TEXT = 100_000
@@ -107,7 +107,7 @@ def _failures(run: Run) -> Block | None:
     for variant, part in split(run.rows.frame, run.rows.group):
         counted: dict[tuple[str, ...], int] = {}
         frames: dict[tuple[str, ...], int] = {}
-        for axes, here in by_axes(part):
+        for axes, here in by_axes(part[[*AXES, "status", "reason"]]):
             place = (variant.label, axes["surface"], axes["trajectory"], axes["spotlights"], f"{axes['power_w']:g}")
             frames[place] = len(here)
             for reason, count in here.loc[here["status"] == "failed", "reason"].value_counts().items():
