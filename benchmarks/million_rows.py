@@ -91,14 +91,16 @@ def main() -> None:
         )
         for step in STEPS:
             begin = time.perf_counter()
-            before = resource.getrusage(resource.RUSAGE_CHILDREN).ru_maxrss
+            before = resource.getrusage(resource.RUSAGE_CHILDREN)
             done = subprocess.run(
                 [sys.executable, __file__, str(folder), "--step", step], check=True, stdout=subprocess.DEVNULL
             )
             assert done.returncode == 0
-            peak = resource.getrusage(resource.RUSAGE_CHILDREN).ru_maxrss
-            grown = f"{peak / 1024:.0f} MB" if peak > before else f"at most {before / 1024:.0f} MB"
-            sys.stdout.write(f"{step:8} {time.perf_counter() - begin:6.1f} s  peak {grown}\n")
+            after = resource.getrusage(resource.RUSAGE_CHILDREN)
+            worked = after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime
+            most = "" if after.ru_maxrss > before.ru_maxrss else "at most "
+            wall = f"{time.perf_counter() - begin:6.1f} s, {worked:6.1f} s of processor time"
+            sys.stdout.write(f"{step:8} {wall}, peak {most}{after.ru_maxrss / 1024:.0f} MB\n")
             sys.stdout.flush()
 
 

@@ -9,6 +9,8 @@ from __future__ import annotations
 
 import contextlib
 import io
+import json
+from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path
 
@@ -16,7 +18,7 @@ from conespot.campaigns.cases import write_cases
 from conespot.campaigns.ending import RunError
 from conespot.campaigns.journal import FILE, Entry, Journal
 from conespot.campaigns.lock import take
-from conespot.campaigns.maker import made_with, maker
+from conespot.campaigns.maker import in_a_line, made_with, maker
 from conespot.campaigns.plain_file import open_plain
 from conespot.campaigns.plan import Plan
 from conespot.campaigns.row import Record, Stated
@@ -25,6 +27,7 @@ from conespot.campaigns.row_text import csv_text
 from conespot.campaigns.schema import resolved
 from conespot.campaigns.standing import FILE as STANDING
 from conespot.campaigns.standing import Count, Standing
+from conespot.results.makers import FILE as MAKERS
 from conespot.scene import InputError
 from conespot.scene.atomic import write_atomically
 from conespot.scene.document import Document, dump, read_document
@@ -99,11 +102,14 @@ class Store:
             write_atomically(self.folder / STANDING, standing.model_dump_json().encode())
 
     def write_rows(self) -> int:
-        """Write errors.csv and errors.parquet of what is finished, in the plan's order; their number of rows."""
+        """Write errors.csv and errors.parquet of what is finished, in the plan's order, who made it; how many rows."""
         if not self.entries:
             return 0
         stated = Stated.by(entry.stated for entry in self.entries.values())
         frame = row_table(self.plan, self.entries, self.record, stated)
+        begun = in_a_line(self.begun_with)
+        makers = Counter(entry.by or begun for entry in self.entries.values() if not entry.error)
+        write_atomically(self.folder / MAKERS, json.dumps(dict(sorted(makers.items())), ensure_ascii=False).encode())
         write_atomically(self.folder / "errors.csv", csv_text(frame))
         packed = io.BytesIO()
         frame.to_parquet(packed, index=False)

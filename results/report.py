@@ -13,6 +13,7 @@ from conespot.results.assumptions import Assumptions, assumptions, pairs
 from conespot.results.columns import SETTING, column
 from conespot.results.figures import Drawing
 from conespot.results.light_exposure import light_exposures
+from conespot.results.makers import maker_block, read_makers
 from conespot.results.paper_values import CITATION
 from conespot.results.run import Run
 from conespot.results.table import Block, Table, number
@@ -45,6 +46,7 @@ def make_report(run: Run, tables: Sequence[Table], drawings: Sequence[Drawing], 
             failures=_failures(run),
             assumed=_assumption_sets(run),
             versions=_versions(data.get("made_with")),
+            makers=maker_block(read_makers(run.folder)),
             resolved=(run.folder / "campaign.yaml").read_text(encoding="utf-8")[:_MOST_TEXT],
             citation=CITATION,
         )

@@ -10,12 +10,13 @@ import pandas as pd
 import pytest
 
 from conespot.campaigns.ending import RunError
-from conespot.campaigns.journal import Journal
+from conespot.campaigns.journal import FILE, Journal
 from conespot.campaigns.maker import maker
 from conespot.campaigns.plan import make_plan
 from conespot.campaigns.row import Finding, Record
 from conespot.campaigns.schema import read_campaign
 from conespot.campaigns.store import open_store
+from conespot.results.makers import read_makers
 from conespot.scene import InputError
 from conespot.scene.document import read_document
 
@@ -207,6 +208,22 @@ def test_every_record_says_what_it_was_made_with(plan, document, run):
     with open_store(run, plan, document) as store:
         assert store.entries[unit.key].by == maker()
         assert store.entries[other.key].by == "variant scalar_spectral, conespot 0"
+        store.write_rows()
+    assert read_makers(run) == {maker(): 1, "variant scalar_spectral, conespot 0": 1}
+
+
+def test_many_units_are_kept_as_they_are_one_by_one_but_the_disk_is_waited_for_once(
+    plan, document, tmp_path, monkeypatch
+):
+    records = [record(plan, unit) for unit in plan.units()]
+    fill(plan, document, tmp_path / "a", plan.units())
+    waits = []
+    with open_store(tmp_path / "b", plan, document) as store:
+        monkeypatch.setattr("os.fsync", waits.append)
+        store.extend(records)
+        assert len(waits) == 1
+        assert store.standing().finished == len(records) == len(store.entries)
+    assert (tmp_path / "b" / FILE).read_bytes() == (tmp_path / "a" / FILE).read_bytes()
 
 
 def test_a_later_record_of_a_unit_replaces_the_error_before_it(plan, document, run):
