@@ -69,27 +69,22 @@ def test_what_was_asked_for_and_cannot_be_said_is_a_failure_in_one_sentence(fold
     assert done.stderr == "campaign: stdout cannot be written: No space left on device\n"
 
 
+#: options of Python, and surroundings
 ODD = {
-    "an ASCII terminal": {"PYTHONIOENCODING": "ascii"},
-    "a Latin-1 terminal": {"PYTHONIOENCODING": "latin-1"},
-    "no locale": {"LC_ALL": "C", "PYTHONCOERCECLOCALE": "0", "PYTHONUTF8": "0"},
-    "another backend": {"MPLBACKEND": "TkAgg"},
-    "no backend": {"MPLBACKEND": "no-such-backend"},
-    "nothing written": {"PYTHONDONTWRITEBYTECODE": "1"},
+    "a Latin-1 terminal and a backend of a desktop": ((), {"PYTHONIOENCODING": "latin-1", "MPLBACKEND": "TkAgg"}),
+    "an ASCII terminal, isolated": (("-I",), {"PYTHONIOENCODING": "ascii", "PYTHONDONTWRITEBYTECODE": "1"}),
+    "no locale, and no backend of that name": (
+        (),
+        {"LC_ALL": "C", "PYTHONCOERCECLOCALE": "0", "PYTHONUTF8": "0", "MPLBACKEND": "no-such-backend"},
+    ),
+    "without assertions and docstrings, warnings are errors": (("-OO", "-W", "error"), {}),
 }
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("name", ODD)
 def test_a_run_is_done_in_odd_surroundings(folder, name):
-    done = shell(RUN, folder, **ODD[name])
-    assert done.returncode == 0, done.stderr
-    assert (folder / "r" / "report.html").exists()
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("options", [("-O",), ("-OO",), ("-I",), ("-W", "error")], ids=" ".join)
-def test_a_run_is_done_by_an_odd_python(folder, options):
-    done = shell(RUN, folder, python=options)
+    options, environment = ODD[name]
+    done = shell(RUN, folder, python=options, **environment)
     assert done.returncode == 0, done.stderr
     assert (folder / "r" / "report.html").exists()

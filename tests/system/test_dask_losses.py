@@ -41,6 +41,9 @@ class FakeBench:
             time.sleep(3600)
         if what == "wears" and first:
             self.worn = True
+        if what == "leaks" and first:
+            self.kept = b"x" * 800_000_000
+            time.sleep(3600)
         cases = self.plan.groups[unit.group].cases
         return Record(unit=unit.key, findings=[Finding(case=c.key, localizer="paper", reason="fake") for c in cases])
 
@@ -82,6 +85,15 @@ def test_a_worker_that_is_killed_from_outside_costs_no_pose(plan, tmp_path):
     errors, notes = do(plan, LocalMachine(kind="local", workers=2), tmp_path, then=kill)
     assert errors == {}
     assert 1 <= len([note for note in notes if note.startswith("a worker was lost")]) <= 2
+
+
+def test_a_worker_that_leaks_is_replaced_by_its_nanny_and_costs_no_pose(plan, tmp_path):
+    machine = LocalMachine(kind="local", workers=2, memory="600 MB")
+    errors, notes = do(plan, machine, tmp_path, "60 leaks")
+    assert errors == {}
+    assert len([note for note in notes if note.startswith("a worker was lost")]) == 1
+    # whoever had the batch is gone, and nobody did more than what was left of it again
+    assert len({name.name.split("-")[1] for name in tmp_path.glob("did-*")}) == 3
 
 
 class Scheduling:
