@@ -32,6 +32,8 @@ def render_xyz(scene: Scene, pose: Pose, power_w: float, *, samples: int = 16) -
     for k in range(len(scene.spotlights)):
         tile = renderer.tile(pose, k, seed=k)
         xyz[tile.crop.slices] += np.float32(power_w) * tile.radiance
+        if tile.glare is not None:
+            xyz += np.float32(power_w) * tile.glare
     return xyz
 
 

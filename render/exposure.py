@@ -168,8 +168,13 @@ class Exposure:
                 assert_never(unknown)
 
     def _lit(self, tiles: Sequence[Tile], power_w: float) -> tuple[Crop, NDArray[np.float32]]:
+        """What the tiles change of the frame, and its radiance: all of it where there is glare."""
         tile = merged(tiles)
-        return tile.crop, self._background[tile.crop.slices] + np.float32(power_w) * tile.radiance
+        if tile.glare is None:
+            return tile.crop, self._background[tile.crop.slices] + np.float32(power_w) * tile.radiance
+        radiance = self._background + np.float32(power_w) * tile.glare
+        radiance[tile.crop.slices] += np.float32(power_w) * tile.radiance
+        return Crop.whole(radiance.shape[:2]), radiance
 
     def _noisy(self, camera: Emva, lit: Sequence[Tile], power_w: float, seed: int) -> Pixels:
         signal = self._background
@@ -182,9 +187,11 @@ class Exposure:
     def _metered(self, camera: Emva, lit: Sequence[Tile], power_w: float) -> Emva:
         if camera.metering is None or not lit:
             return camera
-        _, signal = self._lit(lit, power_w)
-        reached = merged(lit).radiance.max(axis=-1) > 0.0
-        return camera.model_copy(update={"exposure_time": emva.metered_time(signal[reached], camera)})
+        crop, signal = self._lit(lit, power_w)
+        tile = merged(lit)
+        reached = tile.radiance.max(axis=-1) > 0.0
+        signal = signal[tile.crop.within(crop)][reached]
+        return camera.model_copy(update={"exposure_time": emva.metered_time(signal, camera)})
 
     def _for_frame(self, camera: Emva, lit: Sequence[Tile], power_w: float) -> Emva:
         """The camera as it takes one frame: metered anew where it does that for each."""
@@ -210,4 +217,5 @@ def merged(tiles: Sequence[Tile]) -> Tile:
         rows = slice(tile.crop.row - row, tile.crop.row - row + tile.crop.height)
         columns = slice(tile.crop.column - column, tile.crop.column - column + tile.crop.width)
         total[rows, columns] += tile.radiance
-    return Tile(Crop(row, column, height, width), total)
+    glares = [tile.glare for tile in tiles if tile.glare is not None]
+    return Tile(Crop(row, column, height, width), total, np.sum(glares, axis=0) if glares else None)

@@ -58,6 +58,9 @@ def near_plane(scene: Scene) -> float:
     along = middle / (corners.directions @ ahead)
     off = corners.origins + along[:, None] * corners.directions - eye.centre
     reach = float(np.max(np.linalg.norm(off, axis=-1)))  # of what it sees as deep as the eye's centre is
+    # and how far beside that go those through its pupil's rim, from the top of the eye on
+    beside = (abs(1.0 - camera.vergence * depth) for depth in (middle - eye.radius, middle))
+    reach += camera.pupil / 2.0 * max(beside)
     top = eye.radius + math.sqrt(max(eye.radius**2 - reach**2, 0.0))
     return middle + eye.radius - 0.95 * top
 

@@ -13,7 +13,7 @@ from conespot.scene.distortion import Distortion
 
 if TYPE_CHECKING:
     from drjit.auto.ad import Bool, Float
-    from mitsuba import RayDifferential3f, Spectrum
+    from mitsuba import Point2f, RayDifferential3f, Spectrum
 
 #: Newton's steps against distortion end where they are this close to the inverse [px]
 _CLOSE = 1e-3
@@ -37,28 +37,40 @@ class RayGenerator:
         self._axes = None if upright else [mi.Vector3f(*_held(axis)) for axis in camera.axes.tolist()]
         self._near = _held([near])[0]
         self._optics = camera.optics
+        self.has_aperture = camera.pupil > 0.0  #: whether rays come through places all over a pupil
+        self._pupil = _held([camera.pupil / 2.0, camera.vergence]) if self.has_aperture else None
 
     @property
     def disperses(self) -> bool:
         """Whether light of each wavelength has a way of its own; then all of a ray's must be alike."""
         return self._optics is not None
 
-    def rays(self, x: Float, y: Float, wavelengths: Spectrum) -> tuple[RayDifferential3f, Bool | bool]:
+    def rays(
+        self, x: Float, y: Float, wavelengths: Spectrum, place: Point2f | None = None
+    ) -> tuple[RayDifferential3f, Bool | bool]:
         """The rays of film positions (x, y) [px], x to the right and y down, with their wavelengths [nm].
 
-        And which of them reach the vitreous: the iris stops some.
+        And which of them reach the vitreous: the iris stops some. They come through the pinhole, or through the `place`
+        in the entrance pupil, as a unit disc.
         """
         mi, dr, _ = kernel.load()
         across, down = (x - self._middle[0]) * self._pixel[0], (y - self._middle[1]) * self._pixel[1]
         if self._lens is not None:
             across, down = self._lens.undistorted(across, down)
+        through = self._origin
+        if place is not None and self._pupil is not None:
+            radius, vergence = self._pupil
+            place = place * radius
+            across, down = across - vergence * place.x, down + vergence * place.y
+            right, up, _ = self._axes or (mi.Vector3f(1.0, 0.0, 0.0), mi.Vector3f(0.0, 1.0, 0.0), None)
+            through = through + right * place.x + up * place.y
         per_depth = dr.sqrt(dr.fma(across, across, dr.fma(down, down, 1.0)))  # length of a ray a mm down the axis
         if self._axes is None:
             direction = mi.Vector3f(across, -down, -1.0) / per_depth
         else:
             right, up, back = self._axes
             direction = (right * across - up * down - back) / per_depth
-        origin = self._origin + direction * (self._near * per_depth)
+        origin = through + direction * (self._near * per_depth)
         if self._optics is None:
             return mi.RayDifferential3f(origin, direction, wavelengths=wavelengths), True
         entry, way, off = self._optics.enter(tuple(origin), tuple(direction), wavelengths[0], dr.sqrt)

@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import functools
+import math
 
 import numpy as np
 from numpy.typing import NDArray
 
 from conespot.render import emitters, kept, kernel, monte_carlo, shaft, spectral
+from conespot.render.blur import Blur
 from conespot.render.rim import rim_pixels
 from conespot.render.source import Source, outermost
 from conespot.render.stage import Stage
@@ -22,8 +24,9 @@ Image = NDArray[np.float32]
 
 #: the ambient light is collimated and the texture smooth, so the background needs few samples a pixel
 BACKGROUND_SAMPLES = 4
-#: what varies with the wavelength needs more: it leaves 0.3 % of noise in white light where 4 leave 2.4 %
-SPECTRAL_BACKGROUND_SAMPLES = 16
+#: what varies with the wavelength needs more: it leaves 0.3 % of noise in white light where 4 leave 2.4 %. So does what
+#: is seen through all of a lens' aperture
+VARIED_BACKGROUND_SAMPLES = 16
 #: the background belongs to the scene and not to a run: every run sees the same one
 BACKGROUND_SEED = 0
 #: what is rendered around a patch [px]
@@ -54,7 +57,9 @@ class Renderer:
     ) -> None:
         self.scene = scene
         self.samples, self.edge_samples = samples, edge_samples
+        self._blur = Blur(scene.camera)
         self.noise = monte_carlo.tolerance(scene.sensor) if noise is None else noise
+        self.noise *= self._blur.steadiness  # it is rendered sharp and then spread
         self.rendered = 0  #: tiles and backgrounds rendered so far
         self._mi, _, self._kernel = kernel.load()
         self._shaft = scene.instrument.shaft
@@ -84,11 +89,13 @@ class Renderer:
             self._lit.glow.show_spotlight(pose, spotlight)
         self.rendered += 1
         if self.scene.camera.optics is None:
-            inside = crop.hull(self._reach(pose, spotlight), _MARGIN)
+            inside = crop.hull(self._reach(pose, spotlight), self._margin(pose, spotlight))
         else:  # other colours end between those that were asked
             inside = np.ones((crop.height, crop.width), bool)
         patch = Tile(crop, self._radiance(crop, inside, self._edge(crop, pose, spotlight), seed))
-        return patch if self._lit.glow is None else self._on_glow(patch, inside, pose, spotlight, seed)
+        if self._lit.glow is not None:
+            patch = self._on_glow(patch, inside, pose, spotlight, seed)
+        return self._blur.tile(patch)
 
     def _on_glow(self, patch: Tile, inside: NDArray[np.bool_], pose: Pose, spotlight: int, seed: int) -> Tile:
         """The tile of what a spotlight reaches, `inside` `[h, w]`, in the middle of the deep light around it.
@@ -141,21 +148,33 @@ class Renderer:
         return radiance
 
     def footprint(self, pose: Pose, spotlight: int) -> Crop:
-        """The pixels a spotlight can reach; deep light comes back from around them."""
+        """The pixels a spotlight can reach; deep light, and what the lens does not resolve, lie around them."""
         camera, reach = self.scene.camera, self._reach(pose, spotlight)
         if camera.optics is not None and not np.isfinite(reach).all():
             return Crop.whole(camera.shape)  # an outline that no ray meets may run around all that the pupil shows
-        return Crop.around(reach, camera.shape, _MARGIN)
+        return Crop.around(reach, camera.shape, self._margin(pose, spotlight))
+
+    def _margin(self, pose: Pose, spotlight: int) -> int:
+        """What is rendered around its outline [px]: more where that is out of focus."""
+        scene = self.scene
+        if scene.camera.pupil == 0.0:
+            return _MARGIN
+        points, light = self._reached(pose, spotlight), scene.illumination.spectrum
+        blurred = [scene.camera.confusion(points, wavelength) for wavelength in (light.low, light.high)]
+        return _MARGIN + math.ceil(np.nanmax(blurred, initial=0.0))
 
     def _reach(self, pose: Pose, spotlight: int) -> NDArray[np.float64]:
-        """Its cone's outline `[N, 2]` in the image [px], moved along the rays by what bumps may add or hide."""
-        scene = self.scene
-        points = np.concatenate([self._cone(one, spotlight) for one in outermost(scene, pose, spotlight)])
-        camera = scene.camera
+        """Its outline `[N, 2]` in the image [px]."""
+        camera, points = self.scene.camera, self._reached(pose, spotlight)
         if camera.optics is None:
             return camera.project(points)
-        light = scene.illumination.spectrum  # whose colours end in different places
+        light = self.scene.illumination.spectrum  # whose colours end in different places
         return np.concatenate([camera.seeing(w).project(points) for w in (light.low, light.high)])
+
+    def _reached(self, pose: Pose, spotlight: int) -> NDArray[np.float64]:
+        """Its cone's outline on the retina `[N, 3]` [mm], moved along the rays by what bumps may add or hide."""
+        scene = self.scene
+        return np.concatenate([self._cone(one, spotlight) for one in outermost(scene, pose, spotlight)])
 
     def _cone(self, pose: Pose, spotlight: int) -> NDArray[np.float64]:
         """The outline `[N, 3]` [mm] of a still point's cone, moved along the rays by what bumps may add or hide."""
@@ -174,21 +193,29 @@ class Renderer:
             return self._empty_background
         shaded = self._ambient(with_shaft=True)
         shaded.update(shaft.placed(self._mi, self._shaft, pose))
-        frame = self._empty_background.copy()
+        frame = self._kept_background(sharp=True).copy()
         frame[crop.slices] = shaded.render(crop, self.samples, BACKGROUND_SEED)
         self.rendered += 1
-        return frame
+        return frame if self._blur.is_none else self._blur.frame(frame)
 
     @functools.cached_property
     def _empty_background(self) -> Image:
-        """Kept on disk under all that it shows: not the instrument, nor its light."""
+        return self._kept_background(sharp=self._blur.is_none)
+
+    def _kept_background(self, *, sharp: bool) -> Image:
+        """Kept on disk under all that it shows: not the instrument, nor its light. `sharp` is before it is spread."""
         scene, (rows, columns) = self.scene, self.scene.camera.shape
         channels = spectral.channels(scene, scene.ambient.illumination, self._responses, from_outside=True)
         shown = scene.model_dump(include={"eye", "camera", "surface", "retina", "ambient"})
         films = [(channel.film.wavelengths.tolist(), channel.film.values.tolist()) for channel in channels]
-        how = (self._kernel.variant, self._kernel.llvm, self._background_samples, BACKGROUND_SEED)
+        how = (self._kernel.variant, self._kernel.llvm, self._background_samples, BACKGROUND_SEED, sharp)
         address = digest([repr(part) for part in (shown, films, how, kept.made_by())])
-        return kept.kept(address, (rows, columns, len(channels)), self._rendered_background)
+
+        def render() -> Image:
+            frame = self._rendered_background()
+            return frame if sharp else self._blur.frame(frame)
+
+        return kept.kept(address, (rows, columns, len(channels)), render)
 
     def _rendered_background(self) -> Image:
         crop = Crop.whole(self.scene.camera.shape)
@@ -199,7 +226,8 @@ class Renderer:
 
     @property
     def _background_samples(self) -> int:
-        return SPECTRAL_BACKGROUND_SAMPLES if self.scene.retina.is_spectral else BACKGROUND_SAMPLES
+        varied = self.scene.retina.is_spectral or self.scene.camera.pupil > 0.0
+        return VARIED_BACKGROUND_SAMPLES if varied else BACKGROUND_SAMPLES
 
     @functools.lru_cache(maxsize=2)  # noqa: B019 - a renderer lives as long as its process
     def _ambient(self, with_shaft: bool) -> Stage:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 import cv2
 import numpy as np
 from numpy.typing import NDArray
@@ -21,9 +23,16 @@ _STEP = 0.25
 def rim_pixels(scene: Scene, pose: Pose, spotlight: int) -> NDArray[np.uint32]:
     """The pixels `[N]` of the frame (row * width + column, ascending) within half a pixel of a steep beam.
 
-    Of a source that has a core or moves, the whole penumbra. None where the beam is soft. Edges of shadows that bumps
-    or the shaft cast are not among them.
+    Of a source that has a core or moves, the whole penumbra, and of what the lens does not have in focus all within the
+    circle of confusion. None where the beam is soft. Edges of shadows that bumps or the shaft cast are not among them.
     """
+    pixels = _steep(scene, pose, spotlight)
+    radius = float(np.nanmax(scene.camera.confusion(scene.outline(pose, spotlight)), initial=0.0))
+    return _within(radius, pixels, scene.camera.shape) if radius > 0.0 else pixels
+
+
+def _steep(scene: Scene, pose: Pose, spotlight: int) -> NDArray[np.uint32]:
+    """`rim_pixels` where all is in focus."""
     (height, width), b = scene.camera.shape, scene.beam.half_angle
     rim = scene.camera.project(scene.outline(pose, spotlight))
     diameters = np.linalg.norm(rim - np.roll(rim, len(rim) // 2, axis=0), axis=-1)
@@ -81,3 +90,18 @@ def _filled(crop: Crop, outline: NDArray[np.float64]) -> NDArray[np.bool_]:
         corners = np.round(16.0 * (outline - (crop.column + 0.5, crop.row + 0.5))).astype(np.int32)
         cv2.fillPoly(filled, [corners], 1, shift=4)
     return filled > 0
+
+
+def _within(radius: float, pixels: NDArray[np.uint32], shape: tuple[int, int]) -> NDArray[np.uint32]:
+    """The pixels of a frame within `radius` [px] of some of them."""
+    if not len(pixels):
+        return pixels
+    width, reach = shape[1], math.ceil(radius)
+    row, column = np.divmod(pixels.astype(int), width)
+    low, high = np.array([row.min(), column.min()]) - reach, np.array([row.max(), column.max()]) + reach + 1
+    (top, left), (bottom, right) = np.maximum(low, 0), np.minimum(high, shape)
+    off = np.ones((bottom - top, right - left), np.uint8)
+    off[row - top, column - left] = 0
+    near = cv2.distanceTransform(off, cv2.DIST_L2, cv2.DIST_MASK_PRECISE) <= radius
+    rows, columns = np.nonzero(near)
+    return ((rows + top) * width + columns + left).astype(np.uint32)

@@ -42,7 +42,8 @@ def shaft_crop(scene: Scene, shaft: Shaft, pose: Pose) -> Crop:
     body = np.concatenate([p + rim for p in np.linspace(end, far, max(64, math.ceil(3.0 * shaft.length)))])
     shadow = scene.surface.intersect(scene.eye, body, -scene.ambient.towards)
     shadow = shadow[np.all(np.isfinite(shadow), axis=1)]
-    return Crop.around(scene.camera.project(np.concatenate([body, shadow])), scene.camera.shape, margin=2.0)
+    seen, camera = np.concatenate([body, shadow]), scene.camera
+    return Crop.around(camera.project(seen), camera.shape, 2.0 + np.nanmax(camera.confusion(seen), initial=0.0))
 
 
 def _ends(shaft: Shaft, pose: Pose) -> tuple[Array, Array]:

@@ -58,6 +58,11 @@ class Stage:
         mi, _, chosen = kernel.load()
         self._mi, self._vectorized = mi, chosen.vectorized
         self._columns = scene.camera.shape[1]
+        if not chosen.vectorized and scene.camera.pupil > 0.0:
+            raise kernel.KernelError(
+                "a lens with an aperture needs a JIT variant of Mitsuba, and the scalar one is in use;"
+                " `campaign doctor` says why"
+            )
         if not (chosen.vectorized or scene.camera.is_plain):
             raise kernel.KernelError(
                 "a camera that is aslant, distorts, or has a principal point or oblong pixels needs a JIT variant of"

@@ -72,6 +72,17 @@ class Crop:
         row, column = (np.arange(s.start, s.stop, dtype=np.uint32) for s in self.slices)
         return (row[:, None] * np.uint32(columns) + column).ravel()
 
+    def grown(self, down: int, right: int, shape: tuple[int, int]) -> Crop:
+        """The crop with so many more rows above and below, and columns to both sides, cut to a frame of `shape`."""
+        row, column = max(self.row - down, 0), max(self.column - right, 0)
+        bottom, end = min(self.row + self.height + down, shape[0]), min(self.column + self.width + right, shape[1])
+        return Crop(row, column, bottom - row, end - column)
+
+    def within(self, outer: Crop) -> tuple[slice, slice]:
+        """Rows and columns of a crop that holds it."""
+        row, column = self.row - outer.row, self.column - outer.column
+        return slice(row, row + self.height), slice(column, column + self.width)
+
     @property
     def corners(self) -> NDArray[np.float64]:
         """The middles of its first and last pixel `[2, 2]` (x, y); none where it is empty."""
@@ -87,7 +98,11 @@ class Crop:
 
 @dataclass(frozen=True)
 class Tile:
-    """Radiance `[h, w, C]` [W m-2 sr-1] of one spotlight at 1 W inside `crop`; it is 0 outside."""
+    """Radiance `[h, w, C]` [W m-2 sr-1] of one spotlight at 1 W inside `crop`; it is 0 outside.
+
+    A lens' glare `[C]`, if there is any, lies over the whole frame, the crop included, on top of that.
+    """
 
     crop: Crop
     radiance: NDArray[np.float32]
+    glare: NDArray[np.float32] | None = None

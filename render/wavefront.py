@@ -14,7 +14,7 @@ from conespot.render.rays import RayGenerator
 from conespot.render.source import Source, Standing
 
 if TYPE_CHECKING:
-    from drjit.auto.ad import Bool
+    from drjit.auto.ad import Bool, Float, UInt32
     from mitsuba import RayDifferential3f, SamplingIntegrator, Scene, Spectrum
 
 #: how light comes to what the camera sees: from the emitter, which nothing can hide; from the emitter, unless something
@@ -57,13 +57,9 @@ def trace(
     state, sequence = mi.sample_tea_32(first + k, second)
     random = mi.PCG32(initstate=mi.UInt64(state), initseq=mi.UInt64(sequence))
     columns = max(d for d in range(1, int(samples**0.5) + 1) if samples % d == 0)
-    column, row = k % columns, k // columns
-    if halves:
-        half, place = k // (samples // 2), k % (samples // 2)
-        row = place // (columns // 2)
-        column = 2 * (place % (columns // 2)) + (row + half) % 2
-    x = mi.Float(pixel % width) + (mi.Float(column) + random.next_float32()) / columns
-    y = mi.Float(pixel // width) + (mi.Float(row) + random.next_float32()) * (columns / samples)
+    column, row = _cell(k, samples, columns, halves)
+    x = mi.Float(pixel % width) + (column + random.next_float32()) / columns
+    y = mi.Float(pixel // width) + (row + random.next_float32()) * (columns / samples)
     # a ray carries four wavelengths, each a quarter of the range from the next: cells of a quarter tell them all apart.
     # Cells of area and of wavelength are paired at random, or colours would lie across the pixel.
     cells = samples if camera.disperses else 4 * samples
@@ -71,7 +67,14 @@ def trace(
     wavelengths, weight = sensor.sample_wavelengths(dr.zeros(mi.SurfaceInteraction3f), wavelength)
     if camera.disperses:  # light of one wavelength goes this way, so cells of the whole range tell them apart
         wavelengths, weight = mi.Spectrum(wavelengths[0]), mi.Spectrum(weight[0])
-    ray, seen = camera.rays(x, y, wavelengths)
+    place = None
+    if camera.has_aperture:  # each sample has a cell of the pupil too, and so has each half's
+        several = samples // 2 if halves else samples
+        cell = mi.permute_kensler(k % several, several, second) + (k - k % several)
+        across, along = _cell(cell, samples, columns, halves)
+        unit = (across + random.next_float32()) / columns, (along + random.next_float32()) * (columns / samples)
+        place = mi.warp.square_to_uniform_disk_concentric(mi.Point2f(*unit))
+    ray, seen = camera.rays(x, y, wavelengths, place)
     stands = None
     if source is not None:
         # cells of the core and of the exposure too, each paired with those of area at random
@@ -107,6 +110,17 @@ def trace(
     dr.eval(sums)
     means = np.stack([np.asarray(total) / np.float32(block) for total in sums], axis=-1, dtype=np.float32)
     return means.reshape(-1, 2, len(values)) if halves else means
+
+
+def _cell(k: UInt32, samples: int, columns: int, halves: bool) -> tuple[Float, Float]:
+    """Column and row of the `k`-th of so many samples' cells; those of `halves` lie like a chequerboard's colours."""
+    mi, _, _ = kernel.load()
+    column, row = k % columns, k // columns
+    if halves:
+        half, place = k // (samples // 2), k % (samples // 2)
+        row = place // (columns // 2)
+        column = 2 * (place % (columns // 2)) + (row + half) % 2
+    return mi.Float(column), mi.Float(row)
 
 
 def _unblocked(loaded: Any, ray: RayDifferential3f, stands: Standing | None) -> tuple[Spectrum, Bool]:

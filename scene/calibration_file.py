@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from conespot.scene.distortion import COEFFICIENTS
+from conespot.scene.quantity import parse_quantity
 from conespot.scene.text_file import read_text
 
 if TYPE_CHECKING:
@@ -36,6 +37,22 @@ _HEIGHT = ("image_height", "image_Height", "imageHeight", "height")
 _SIZE = ("image_size", "imageSize", "size", "resolution")
 #: words for the model of `Distortion`, where a file names one
 _MODELS = {"plumb_bob", "brown_conrady", "opencv", "pinhole", "radtan", "standard"}
+
+
+def calibrated(data: Any, folder: Path) -> Any:
+    """A camera's keys with what the `calibration` file that they name holds, in a `folder`, where they name one.
+
+    Raises ValueError for a bad file, and for a key that would come from both.
+    """
+    if not (isinstance(data, dict) and "calibration" in data):
+        return data
+    if not isinstance(data["calibration"], str):
+        raise ValueError(f"calibration: name a file of OpenCV's, got {data['calibration']!r}")
+    found = intrinsics(folder / data["calibration"], parse_quantity(data.get("sensor_width", 36.0), "length"))
+    given = [key for key in found if key in data]
+    if given:
+        raise ValueError(f"{', '.join(given)} would also come from calibration; give only one of the two")
+    return {**{key: value for key, value in data.items() if key != "calibration"}, **found}
 
 
 def intrinsics(path: Path, sensor_width: float) -> dict[str, Any]:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import re
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -11,39 +10,28 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from pydantic import BeforeValidator, Field, PrivateAttr, ValidationInfo, model_validator
 
-from conespot.scene.calibration_file import intrinsics
+from conespot.scene import attitude, defocus
+from conespot.scene.calibration_file import calibrated
 from conespot.scene.distortion import Distortion
+from conespot.scene.lens import AnyLens
 from conespot.scene.model import Model
 from conespot.scene.optics import SODIUM, AnyOptics
 from conespot.scene.quantity import Angle, Length, parse_quantity
 from conespot.scene.rays import Rays
 from conespot.scene.refracted import found, refracted
+from conespot.scene.resolution import Resolution
 
 Array = NDArray[np.float64]
 _STILL = np.zeros(3)
-_FEWEST, _MOST = 16, 20000
 #: a lens that folds the image this close to the frame's corners, relative to their distance from the principal point,
 #: is refused: what lies just outside the frame must not come back into it
 _MARGIN = 1.05
-
-
-def _resolution(value: object) -> object:
-    """A pair for [width, height] and "1920x1080"; a square's side alone, so that it has one address."""
-    if isinstance(value, str) and (match := re.fullmatch(r"\s*(\d+)\s*[xX×]\s*(\d+)\s*", value)):
-        value = [int(match[1]), int(match[2])]
-    if not isinstance(value, (list, tuple)):
-        return value
-    whole = len(value) == 2 and all(type(side) is int and _FEWEST <= side <= _MOST for side in value)
-    if not whole:
-        raise ValueError(f"give pixels a side, or [width, height], from {_FEWEST} to {_MOST}, got {list(value)!r}")
-    return value[0] if value[0] == value[1] else tuple(value)
 
 
 def _pixels(value: object) -> float:
     return parse_quantity(value, "pixels")
 
 
-_Side = Annotated[int, Field(ge=_FEWEST, le=_MOST)]
 _Pixels = Annotated[float, BeforeValidator(_pixels)]
 
 
@@ -67,8 +55,7 @@ class Camera(Model):
     [0.0, 0.0, -1.0]
     """
 
-    #: pixels a side, or width and height [px]
-    resolution: Annotated[_Side | tuple[_Side, _Side], BeforeValidator(_resolution)] = 5000
+    resolution: Resolution = 5000  #: pixels a side, or width and height [px]
     sensor_width: Length = Field(36.0, gt=0.0)
     focal_length: Length = Field(300.0, gt=0.0)
     height: Length = Field(110.0, gt=0.0)  #: pinhole above the posterior pole (from `look_at`), the paper's d0 [mm]
@@ -81,21 +68,13 @@ class Camera(Model):
     #: where the axis goes through, were there no optics [mm]
     look_at: tuple[Length, Length, Length] = (0.0, 0.0, 0.0)
     optics: AnyOptics = None  #: of the eye that it looks into; with none the retina lies in the open
+    lens: AnyLens = None  #: its own aperture, blur and glare; with none it is a pinhole that sees all sharp
     _wavelength: float = PrivateAttr(SODIUM)
 
     @model_validator(mode="before")
     @classmethod
     def _calibrated(cls, data: Any, info: ValidationInfo) -> Any:
-        if not (isinstance(data, dict) and "calibration" in data):
-            return data
-        if not isinstance(data["calibration"], str):
-            raise ValueError(f"calibration: name a file of OpenCV's, got {data['calibration']!r}")
-        path = Path(info.context["folder"] if info.context else ".") / data["calibration"]
-        found = intrinsics(path, parse_quantity(data.get("sensor_width", 36.0), "length"))
-        given = [key for key in found if key in data]
-        if given:
-            raise ValueError(f"{', '.join(given)} would also come from calibration; give only one of the two")
-        return {**{key: value for key, value in data.items() if key != "calibration"}, **found}
+        return calibrated(data, Path(info.context["folder"] if info.context else "."))
 
     @model_validator(mode="after")
     def _one_to_one(self) -> Camera:
@@ -139,15 +118,7 @@ class Camera(Model):
     @property
     def axes(self) -> Array:
         """Unit vectors `[3, 3]`, one a row: to the right in the image, up in the image, and back along the axis."""
-        turn = _about_z(self.azimuth)
-        lean = np.array(
-            [
-                [math.cos(self.tilt), 0.0, math.sin(self.tilt)],
-                [0.0, 1.0, 0.0],
-                [-math.sin(self.tilt), 0.0, math.cos(self.tilt)],
-            ]
-        )
-        return np.asarray((turn @ lean @ turn.T @ _about_z(-self.roll)).T)
+        return attitude.axes(self.tilt, self.azimuth, self.roll)
 
     @property
     def principal(self) -> Array:
@@ -181,7 +152,7 @@ class Camera(Model):
         0.00264
         """
         if self.optics is not None:
-            seen = self._refracted(self.project(np.zeros(3)))
+            seen = self._unstopped(self.project(np.zeros(3)))
             # as far from where the ray enters the vitreous as the pole is
             moved = seen.origins_by_x + np.linalg.norm(seen.origins) * seen.directions_by_x
             return float(np.linalg.norm(moved))
@@ -203,15 +174,44 @@ class Camera(Model):
             update["principal_point"] = tuple(scale * c for c in self.principal_point)
         return self.model_copy(update=update)
 
-    def rays(self, pixels: ArrayLike, wavelength: float | None = None) -> Rays:
+    def rays(self, pixels: ArrayLike, wavelength: float | None = None, pupil: ArrayLike | None = None) -> Rays:
         """The rays of pixel coordinates `[..., 2]` [px], in the frame or beyond; NaN where the lens puts nothing.
 
         Through the eye's optics they are those in the vitreous, of a `wavelength` [nm] or the camera's own, and NaN
-        where the iris stops them: such a pixel is black.
+        where the iris stops them: such a pixel is black. They go through the pinhole, the middle of the entrance
+        pupil, or through places in the `pupil` `[..., 2]` [mm], to the right and up in the image.
         """
+        seen = self._in_air(pixels) if pupil is None else self._in_air(pixels, pupil, self.vergence)
         if self.optics is None:
-            return self._in_air(pixels)
-        return refracted(self.optics, self._in_air(pixels), wavelength or self._wavelength)
+            return seen
+        return refracted(self.optics, seen, wavelength or self._wavelength)
+
+    @property
+    def pupil(self) -> float:
+        """Diameter of the lens' entrance pupil [mm]; 0 is a pinhole."""
+        return 0.0 if self.lens is None else self.lens.pupil(self.height)
+
+    @property
+    def vergence(self) -> float:
+        """Of the light that the lens has in focus: 1 over the distance of that plane down the axis in air [1/mm]."""
+        sharp = np.array([0.0, 0.0, 0.0 if self.lens is None else self.lens.focus])
+        if self.optics is None:
+            return 1.0 / float((self.centre - sharp) @ self.axes[2])
+        at = np.tile(self.project(sharp), (4, 1))
+        return defocus.vergence(lambda places, v: self._unstopped(at, None, places, v), sharp, 1.0 / self.height)
+
+    def confusion(self, points: ArrayLike, wavelength: float | None = None) -> Array:
+        """Radius `[...]` [px] of what the lens makes of points `[..., 3]` [mm]; NaN where no ray meets them.
+
+        At a `wavelength` [nm] or the camera's own: the eye's optics have no other in focus at the same place.
+        """
+        p = np.asarray(points, float)
+        if self.pupil == 0.0:
+            return np.zeros(p.shape[:-1])
+        at, there = p.reshape(-1, 3), self.vergence
+        q = self.project(at)
+        radius = defocus.blurred(lambda place: self._unstopped(q, wavelength, place, there), at, self.pupil / 2.0)
+        return radius.reshape(p.shape[:-1])
 
     def shows(self, pixels: ArrayLike) -> NDArray[np.bool_]:
         """Which pixel coordinates `[..., 2]` [px] lie in the frame, and are not black for the iris: `[...]`."""
@@ -219,19 +219,26 @@ class Camera(Model):
         inside = np.all((q >= 0.0) & (q <= self.shape[::-1]), axis=-1)
         return inside if self.optics is None else inside & np.isfinite(self.rays(q).directions[..., 0])
 
-    def _refracted(self, pixels: ArrayLike) -> Rays:
+    def _unstopped(
+        self, pixels: ArrayLike, wavelength: float | None = None, pupil: ArrayLike = (0.0, 0.0), vergence: float = 0.0
+    ) -> Rays:
         """The rays as if the iris let them through, so that an outline goes on behind it."""
-        assert self.optics is not None
-        return refracted(self.optics, self._in_air(pixels), self._wavelength, stopped=False)
+        seen = self._in_air(pixels, pupil, vergence)
+        if self.optics is None:
+            return seen
+        return refracted(self.optics, seen, wavelength or self._wavelength, stopped=False)
 
-    def _in_air(self, pixels: ArrayLike) -> Rays:
-        """`rays` of the camera alone."""
+    def _in_air(self, pixels: ArrayLike, pupil: ArrayLike = (0.0, 0.0), vergence: float = 0.0) -> Rays:
+        """`rays` of the camera alone, for a `vergence` [1/mm] of the light that is in focus."""
         q = np.asarray(pixels, float)
         x, y = self.on_plane(q)
         if self.distortion is not None:
             x, y = self.distortion.undistorted(x, y)
-        d = np.empty((3, *q.shape[:-1]))  # components first: three times as fast as last
-        d[0], d[1], d[2] = x, 0.0 - y, -1.0  # no negative zero
+        place = np.asarray(pupil, float)
+        moved = bool(np.any(place))
+        ahead = (x - vergence * place[..., 0], y + vergence * place[..., 1]) if moved else (x, y)
+        d = np.empty((3, *np.shape(ahead[0])))  # components first: three times as fast as last
+        d[0], d[1], d[2] = ahead[0], 0.0 - ahead[1], -1.0  # no negative zero
         length = np.sqrt(d[0] * d[0] + d[1] * d[1] + 1.0)
         d /= length
         per_x = 1.0 / (self.focal_length_px * length)
@@ -250,7 +257,8 @@ class Camera(Model):
         seen = [part.transpose(last) for part in (d, by_x, by_y)]
         if self.tilt or self.roll:
             seen = [part @ self.axes for part in seen]
-        return Rays(self.centre, seen[0], _STILL, _STILL, seen[1], seen[2])
+        origin = self.centre + place @ self.axes[:2] if moved else self.centre
+        return Rays(origin, seen[0], _STILL, _STILL, seen[1], seen[2])
 
     def project(self, points: ArrayLike) -> Array:
         """Pixel coordinates `[..., 2]` [px] of points `[..., 3]` [mm], the inverse of `rays`.
@@ -263,7 +271,7 @@ class Camera(Model):
         """
         if self.optics is None:
             return self._from_air(points)
-        return found(self._refracted, np.asarray(points, float), self._from_air([0.0, 0.0, self.optics.iris]))
+        return found(self._unstopped, np.asarray(points, float), self._from_air([0.0, 0.0, self.optics.iris]))
 
     def _from_air(self, points: ArrayLike) -> Array:
         """`project` of the camera alone."""
@@ -285,8 +293,3 @@ class Camera(Model):
         """Pixel coordinates `[..., 2]` [px] as (x, y), y down, on the plane at distance 1, where the lens put them."""
         (cx, cy), f = self.principal, self.focal_length_px
         return (pixels[..., 0] - cx) / f, (pixels[..., 1] - cy) / (f * self.pixel_aspect)
-
-
-def _about_z(angle: float) -> Array:
-    c, s = math.cos(angle), math.sin(angle)
-    return np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])

@@ -62,11 +62,11 @@ def found(rays: Callable[[Array], Rays], points: Array, start: Array) -> Array:
     left = np.flatnonzero(np.all(np.isfinite(target), axis=1))
     at = np.tile(np.asarray(start, float), (len(left), 1))
     part = np.ones(len(left))  # of a whole step
-    side = np.sign(_newton(rays(at[:1]), target[left[:1]])[1]) if len(left) else np.ones(1)
-    step = _newton(rays(at), target[left])[0]
+    side = np.sign(steps_to(rays(at[:1]), target[left[:1]])[1]) if len(left) else np.ones(1)
+    step = steps_to(rays(at), target[left])[0]
     for _ in range(_MOST_STEPS):
         there = at + part[:, None] * step
-        after, orientation, ahead = _newton(rays(there), target[left])
+        after, orientation, ahead = steps_to(rays(there), target[left])
         good = np.all(np.isfinite(after), axis=1) & (orientation * side > 0.0)
         done = good & (np.abs(after).max(axis=1, initial=0.0) < _CONVERGED)
         met = done & (ahead > 0.0)
@@ -80,7 +80,7 @@ def found(rays: Callable[[Array], Rays], points: Array, start: Array) -> Array:
     return pixels.reshape(*np.shape(points)[:-1], 2)
 
 
-def _newton(rays: Rays, points: Array) -> tuple[Array, Array, Array]:
+def steps_to(rays: Rays, points: Array) -> tuple[Array, Array, Array]:
     """The steps `[N, 2]` [px] that take rays to points `[N, 3]`, as seen along the rays.
 
     Also the area `[N]` [mm2/px2] that a pixel sees there, negative where the image is turned over, and how far along

@@ -99,6 +99,31 @@ class Scene(Model):
         return self
 
     @model_validator(mode="after")
+    def _has_the_eye_in_focus(self) -> Scene:
+        lowest = self.eye.radius * min(0.0, 1.0 - self.surface.semi_axes[2]) - self.surface.relief
+        for camera in [self.camera, *self.cameras.values()]:
+            if camera.lens is None or camera.pupil == 0.0:
+                continue
+            pupil = format_quantity(round(camera.pupil, 3), "length")
+            if not lowest <= camera.lens.focus <= 2.0 * self.eye.radius - lowest:
+                where = "behind" if camera.lens.focus < lowest else "in front of"
+                raise ValueError(
+                    f"camera.lens.focus: {format_quantity(camera.lens.focus, 'length')} is {where} the eye; give the"
+                    f" height above the posterior pole, from 0 mm to {format_quantity(2.0 * self.eye.radius, 'length')}"
+                )
+            if camera.pupil > camera.height:
+                raise ValueError(
+                    f"camera.lens: an entrance pupil of {pupil} is wider than the working distance is long"
+                    f" (camera.height, {format_quantity(camera.height, 'length')})"
+                )
+            top = 2.0 * self.eye.radius if camera.optics is None else camera.optics.top
+            if camera.centre[2] - camera.pupil / 2.0 * math.sin(camera.tilt) <= top:
+                raise ValueError(f"camera.lens: an entrance pupil of {pupil} reaches into the eye; raise the camera")
+            if not math.isfinite(camera.vergence):
+                raise ValueError("camera.lens.focus: no ray of the camera meets that point; check pupil and tilt")
+        return self
+
+    @model_validator(mode="after")
     def _has_a_surface(self) -> Scene:
         surface, radius = self.surface, self.eye.radius
         for bump in surface.bumps:

@@ -10,9 +10,12 @@ from conespot.scene.scene import Scene
 def assumed(scene: Scene) -> dict[str, str]:
     """Radius of the eye, edge of the beam, power convention, transfer of the sensor, and surface, in words by name.
 
-    The radius comes with the optics that the eye is seen through, the transfer with what moves, if there is any.
+    The radius comes with the optics that the eye is seen through, the transfer with the lens and with what moves, if
+    there are any.
     """
     transfer = scene.sensor.words
+    if scene.camera.lens is not None:
+        transfer += f", behind a lens: {scene.camera.lens.words(scene.camera.height)}"
     if scene.motion is not None:
         transfer += f", {scene.motion.words} during {1e3 * exposure_of(scene.motion, scene.sensor):g} ms"
     radius = format_quantity(scene.eye.radius, "length")

@@ -1,0 +1,99 @@
+"""Point spread: how the light of a point lies around its image, as lengths in the plane that is looked at."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated, Any, Literal
+
+import numpy as np
+from pydantic import BeforeValidator, Field, ValidationInfo, model_validator
+
+from conespot.scene.csv_lines import CsvLine, csv_lines
+from conespot.scene.model import Model
+from conespot.scene.quantity import Length, format_quantity, parse_quantity
+from conespot.scene.text_file import at_home
+
+#: no residual spread is wider [mm]: what is more is glare
+WIDEST = 1.0
+_MOST_POINTS = 4096
+_Radius = Annotated[Length, Field(ge=0.0, le=WIDEST)]
+_Relative = Annotated[float, Field(ge=0.0, allow_inf_nan=False)]
+
+
+class GaussianSpread(Model):
+    """A Gaussian of standard deviation `sigma` along either axis."""
+
+    kind: Literal["gaussian"] = "gaussian"
+    sigma: Annotated[Length, Field(gt=0.0, le=WIDEST / 5.0)]
+
+    @property
+    def words(self) -> str:
+        """The point spread in words, as tables state it."""
+        return f"blur of sigma {format_quantity(1e3 * self.sigma, 'length').removesuffix(' mm')} um"
+
+
+class TabulatedSpread(Model):
+    """Measured: relative `values` per area at `radii` from the middle, linear between them and 0 beyond the last.
+
+    A file has them in its first two columns, radii in um.
+    """
+
+    kind: Literal["table"] = "table"
+    radii: tuple[_Radius, ...] = Field(min_length=2, max_length=_MOST_POINTS)
+    values: tuple[_Relative, ...] = Field(min_length=2, max_length=_MOST_POINTS)
+
+    @model_validator(mode="after")
+    def _a_profile(self) -> TabulatedSpread:
+        if len(self.radii) != len(self.values):
+            raise ValueError("radii and values must have the same length")
+        if self.radii[0] != 0.0 or np.any(np.diff(self.radii) <= 0.0):
+            raise ValueError("radii must begin at 0 and increase")
+        if not max(self.values) > 0.0:
+            raise ValueError("values must not be zero everywhere")
+        return self
+
+    @property
+    def words(self) -> str:
+        """The point spread in words, as tables state it."""
+        return f"tabulated blur up to {1e3 * self.radii[-1]:.6g} um"
+
+
+def _read(path: Path) -> dict[str, Any]:
+    """Radii and values of a CSV file. Raises ValueError with file and line for anything else."""
+    pairs: list[tuple[float, float]] = []
+    header: CsvLine | None = None
+    for line in csv_lines(path, "point spread"):
+        try:
+            pairs.append((1e-3 * line.value(0), line.value(1)))
+        except ValueError as error:
+            if pairs or header is not None:
+                example = "expected a radius in um and a value, as in `2.5, 0.8`"
+                raise ValueError(f"{path}:{line.number}: {example} ({error})") from None
+            header = line
+        if len(pairs) > _MOST_POINTS:
+            raise ValueError(f"{path}:{line.number}: more than {_MOST_POINTS} lines")
+    radii, values = zip(*pairs, strict=True) if pairs else ((), ())
+    return {"radii": [format_quantity(radius, "length") for radius in radii], "values": list(values)}
+
+
+def _spread(value: Any, info: ValidationInfo) -> Any:
+    """A length alone is a Gaussian's sigma; `none` and 0 are no blur; a mapping's kind shows in its keys."""
+    if value == "none":
+        return None
+    if isinstance(value, dict) and "kind" not in value:
+        if "file" in value:
+            if len(value) > 1:
+                raise ValueError("a file holds the whole profile; leave the other keys out")
+            folder = Path((info.context or {}).get("folder", "."))
+            value = _read(folder / at_home(Path(str(value["file"]))))
+        return {"kind": "table" if "radii" in value or "values" in value else "gaussian", **value}
+    if isinstance(value, (str, int, float)) and not isinstance(value, bool):
+        sigma = parse_quantity(value, "length", bare=not info.context)
+        return None if sigma == 0.0 else {"kind": "gaussian", "sigma": value}
+    return value
+
+
+#: what the key of a file holds: `none`, a Gaussian's sigma, a file or a profile
+PointSpread = Annotated[
+    Annotated[GaussianSpread | TabulatedSpread, Field(discriminator="kind")] | None, BeforeValidator(_spread)
+]
