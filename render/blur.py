@@ -116,15 +116,14 @@ def _gaussian(sigma: float) -> Array:
     reach = math.ceil(_FAR * sigma) + 1
     places = np.arange(-reach, reach + 1)
 
-    def integrals(narrower: float) -> Array:
-        edges = ndtr((np.arange(-reach, reach + 2) - 0.5) / narrower)
+    def integrals(width: float) -> Array:
+        edges = ndtr((np.arange(-reach, reach + 2) - 0.5) / width)
         return np.asarray(np.diff(edges) / (edges[-1] - edges[0]))
 
-    def excess(narrower: float) -> float:
-        return float(np.sum(places**2 * integrals(narrower)) - sigma**2)
+    def excess(width: float) -> float:
+        return float(np.sum(places**2 * integrals(width)) - sigma**2)
 
-    # below a few hundredths of a pixel nothing is spread
-    return integrals(brentq(excess, 1e-3, sigma, xtol=1e-9)) if excess(sigma) > 0.0 else integrals(sigma)
+    return integrals(brentq(excess, 1e-3, sigma + 1.0, xtol=1e-9))
 
 
 def _tabulated(spread: TabulatedSpread, width: float, height: float) -> Array:

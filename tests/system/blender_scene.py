@@ -60,6 +60,11 @@ camera = bpy.data.cameras.new("camera")
 camera.sensor_fit = "HORIZONTAL"
 camera.sensor_width, camera.lens = setting["sensor_width"], setting["focal_length"]
 camera.clip_start, camera.clip_end = 1.0, 1000.0
+if setting["aperture"] > 0.0:
+    camera.dof.use_dof = True
+    camera.dof.focus_distance = setting["height"] - setting["focus"]
+    # Blender takes its unit of length for a metre, but the focal length in mm
+    camera.dof.aperture_fstop = 1e-3 * setting["focal_length"] / setting["aperture"]
 eye = bpy.data.objects.new("camera", camera)
 eye.location = (0.0, 0.0, setting["height"])
 scene.collection.objects.link(eye)
