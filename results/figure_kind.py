@@ -51,6 +51,7 @@ class FigureKind(ABC):
     name: ClassVar[str]
     what: ClassVar[str]
     numbers: ClassVar[Mapping[str, int]] = {}
+    of_run: ClassVar[bool] = False  #: drawn once, of all its rows; such a figure stands for those of single variants
 
     def suits(self, cut: Cut) -> bool:
         """Whether there is anything to draw."""

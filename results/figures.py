@@ -15,11 +15,12 @@ import pandas as pd
 from conespot.results.figure_kind import Cut, FigureKind
 from conespot.results.pose_figure import AlongTrajectory
 from conespot.results.power_figure import OverPower
+from conespot.results.reality_figure import RealityGap
 from conespot.results.run import Run
 from conespot.results.style import files, save, style
-from conespot.results.variants import ordered, paired
+from conespot.results.variants import Variant, ordered, paired
 
-FIGURES: dict[str, FigureKind] = {kind.name: kind for kind in (AlongTrajectory(), OverPower())}
+FIGURES: dict[str, FigureKind] = {kind.name: kind for kind in (AlongTrajectory(), OverPower(), RealityGap())}
 _MOST_FIGURES = 60
 
 
@@ -40,8 +41,8 @@ def plan_figures(run: Run, boxes: pd.DataFrame | None) -> tuple[list[Drawing], i
     Returns at most sixty, and how many are left out.
     """
     found: dict[str, Drawing] = {}
-    for cut in _cuts(run, boxes) if boxes is not None else ():
-        for kind in FIGURES.values():
+    for kinds, cut in _parts(run, boxes) if boxes is not None else ():
+        for kind in kinds:
             if kind.suits(cut):
                 stem = kind.stem(cut)  # long names may only differ in what a file name leaves out
                 name = f"{stem}-{len(found) + 1}" if stem in found else stem
@@ -84,6 +85,19 @@ def _help(drawings: list[Drawing], folder: Path) -> None:
         _draw(drawings, folder)
     except BaseException:
         os._exit(1)
+
+
+def _parts(run: Run, boxes: pd.DataFrame) -> Iterator[tuple[list[FigureKind], Cut]]:
+    """What is drawn of a run: figures of all its rows or, where there are none, of each part."""
+    if run.rows is not None:
+        whole = Cut(run, Variant({}, "all localizers", "all"), "", "", run.rows.frame, boxes)
+        of_run = [kind for kind in FIGURES.values() if kind.of_run and kind.suits(whole)]
+        if of_run:
+            yield of_run, whole
+            return
+    of_parts = [kind for kind in FIGURES.values() if not kind.of_run]
+    for cut in _cuts(run, boxes):
+        yield of_parts, cut
 
 
 def _cuts(run: Run, boxes: pd.DataFrame) -> Iterator[Cut]:

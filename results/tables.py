@@ -9,6 +9,7 @@ import pandas as pd
 from conespot.results.check import expectation_table
 from conespot.results.error_tables import ERROR_TABLES, POWER, cells
 from conespot.results.precision import precision_table
+from conespot.results.reality_gap import reality_table
 from conespot.results.released import released_table
 from conespot.results.run import Run
 from conespot.results.table import Table
@@ -16,7 +17,7 @@ from conespot.results.table_1 import table_1
 from conespot.results.white import white_table
 
 #: tables that need no boxes, before and after those of errors, by the name of their file
-_FIRST: dict[str, Callable[[Run], Table | None]] = {"table_1": table_1}
+_FIRST: dict[str, Callable[[Run], Table | None]] = {"table_1": table_1, "reality_gap": reality_table}
 _LAST: dict[str, Callable[[Run], Table | None]] = {
     "precision": precision_table,
     "white": white_table,
