@@ -169,6 +169,7 @@ def extremes(pose: Pose, rcm: ArrayLike) -> list[Pose]:
     """Of `poses_during`, those that are furthest in any direction: what all of them light lies between these."""
     if pose.sway is None:
         return [pose]
-    ways = np.array([(x, y, z) for x in (-1, 0, 1) for y in (-1, 0, 1) for z in (-1, 0, 1)], float)
+    steps = np.arange(-2.0, 3.0)
+    ways = np.stack(np.meshgrid(steps, steps, steps), axis=-1).reshape(-1, 3)
     furthest = np.unique(np.argmax(pose.sway @ ways.T, axis=0))
     return poses_during(replace(pose, sway=pose.sway[furthest]), rcm)
