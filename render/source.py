@@ -135,10 +135,10 @@ def stands(scene: Scene, pose: Pose, spotlight: int) -> list[Pose]:
     if still and scene.beam.source_diameter == 0.0:
         return [pose]
     k = np.arange(_STANDS) + 0.5
-    # Fibonacci's lattice over the core, and instants along it that follow the golden ratio squared
+    # Fibonacci's lattice over the core; instants by another irrational, or each direction had an instant of its own
     radius, angle = np.sqrt(k / _STANDS) * scene.beam.source_diameter / 2.0, 2.0 * np.pi * _GOLDEN * k
     places = radius[:, None] * np.stack([np.cos(angle), np.sin(angle)], axis=-1)
-    instants = (k * _GOLDEN**2) % 1.0
+    instants = (k * np.sqrt(2.0)) % 1.0
     found = []
     for place, instant in zip(places, instants, strict=True):
         one = pose
