@@ -76,6 +76,6 @@ def test_a_frame_that_claims_more_than_it_can_hold_is_refused_before_it_is_unpac
 def test_a_twentieth_of_the_fuzzing_and_the_command_find_no_defect():
     """YAML, CSV, frames and damaged run folders, in a process and through the command."""
     script = Path(__file__).parents[2] / "benchmarks" / "fuzz.py"
-    command = [sys.executable, str(script), "--seed", "5", "--share", "0.05", "--command", "3"]
+    command = [sys.executable, str(script), "--seed", "5", "--share", "0.05", "--command", "3", "--seconds", "60"]
     done = subprocess.run(command, capture_output=True, text=True, timeout=600)
     assert done.returncode == 0, done.stdout
