@@ -8,6 +8,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from conespot.results.assumptions import assumptions, pairs
 from conespot.results.figure_kind import Cut, FigureKind
 from conespot.results.reality_gap import EFFECT, Cost, costs, is_gap, names
 from conespot.results.style import COLOURS, frame, plain_numbers
@@ -45,7 +46,8 @@ class RealityGap(FigureKind):
         frames = max((cost.frames for cost in costs(cut.rows).values()), default=0)
         return (
             f"Marks: median over the frames that were localized, of {frames} each; beside a mark how many were refused."
-            " A mark on the right edge: all were. Localizers' models know no blur, no deep light and no motion."
+            " A mark on the right edge: all were. Localizers' models know no blur, no deep light and no motion.\n"
+            + _assumed(cut)
         )
 
     def draw(self, cut: Cut, title: str, caption: str) -> Figure:
@@ -77,6 +79,12 @@ class RealityGap(FigureKind):
                 _marks(axes, own, 0.22 * (k - (len(localizers) - 1) / 2.0), k, localizer, 2.4 * most)
         panels[-1].legend(loc="upper right", bbox_to_anchor=(1.0, -0.12), ncols=len(localizers))
         return figure
+
+
+def _assumed(cut: Cut) -> str:
+    """What all of it assumes; sensors and localizers of the effects are named by the table."""
+    sentence = assumptions(cut.run.cases, pairs(cut.rows)).sentence()
+    return f"Assumes {sentence}."
 
 
 def _marks(axes: Axes, own: list[Cost | None], shift: float, k: int, label: str, edge: float) -> None:

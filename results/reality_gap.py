@@ -6,11 +6,13 @@ A campaign has it that sweeps named choices called `effect`, of which the first 
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Any
 
 import pandas as pd
 
+from conespot.results.assumptions import assumptions, pairs
 from conespot.results.run import Run
 from conespot.results.table import Block, Table, number
 
@@ -42,14 +44,20 @@ def names(rows: pd.DataFrame, label: str) -> list[str]:
     return [str(value) for value in dict.fromkeys(rows[label])]
 
 
-def costs(rows: pd.DataFrame) -> dict[tuple[str, str, str], Cost]:
-    """The cost of each localizer, effect and light that there are rows of; poses and trajectories are pooled."""
-    found = {}
+def parts(rows: pd.DataFrame) -> Iterator[tuple[tuple[str, str, str], pd.DataFrame]]:
+    """The rows of each localizer, effect and light; poses and trajectories are pooled."""
     for key, part in rows.groupby(["localizer", EFFECT, "illumination"], sort=False):
+        localizer, effect, light = map(str, key)
+        yield (localizer, effect, light), part
+
+
+def costs(rows: pd.DataFrame) -> dict[tuple[str, str, str], Cost]:
+    """The cost of each localizer, effect and light that there are rows of."""
+    found = {}
+    for key, part in parts(rows):
         good = part.loc[part["status"] == "ok", "position_error_mm"]
         worst = float(good.max()) if len(good) else math.nan
-        localizer, effect, light = map(str, key)
-        found[localizer, effect, light] = Cost(len(part), len(part) - len(good), float(good.median()), worst)
+        found[key] = Cost(len(part), len(part) - len(good), float(good.median()), worst)
     return found
 
 
@@ -59,6 +67,7 @@ def reality_table(run: Run) -> Table | None:
         return None
     rows = run.rows.frame
     found, effects, lights = costs(rows), names(rows, EFFECT)[:_MOST_NAMED], names(rows, "illumination")
+    assumed = {key: assumptions(run.cases, pairs(part)) for key, part in parts(rows)}
     records: list[dict[str, Any]] = []
     blocks = []
     for localizer in names(rows, "localizer"):
@@ -72,10 +81,14 @@ def reality_table(run: Run) -> Table | None:
                     ideal = found.get((localizer, effects[0], light), cost).median
                     about = {"localizer": localizer, EFFECT: effect, "illumination": light, "frames": cost.frames}
                     numbers = {"refused": cost.refused, "median_mm": cost.median, "max_mm": cost.worst}
-                    records.append({**about, **numbers, "over_first": cost.median / ideal if ideal else math.nan})
+                    over = {"over_first": cost.median / ideal if ideal else math.nan}
+                    assumes = assumed[localizer, effect, light].columns()
+                    records.append({**about, **numbers, **over, **assumes})
             lines.append(tuple(cells))
         header = tuple(part for light in lights for part in (f"{light} [um]", "refused"))
-        blocks.append(Block(localizer, (EFFECT, *header), tuple(lines), ()))
+        sets = dict.fromkeys(one for (name, _, _), one in assumed.items() if name == localizer)
+        notes = tuple(f"Assumes {one.sentence()}." for one in sets)
+        blocks.append(Block(localizer, (EFFECT, *header), tuple(lines), notes[:_MOST_NAMED]))
     return Table("reality_gap", "The reality gap", pd.DataFrame(records), tuple(blocks), (_NOTE,))
 
 

@@ -74,7 +74,7 @@ class Camera(Model):
     @model_validator(mode="before")
     @classmethod
     def _calibrated(cls, data: Any, info: ValidationInfo) -> Any:
-        return calibrated(data, Path(info.context["folder"] if info.context else "."))
+        return calibrated(data, Path((info.context or {}).get("folder", ".")))
 
     @model_validator(mode="after")
     def _one_to_one(self) -> Camera:

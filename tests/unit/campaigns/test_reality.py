@@ -21,7 +21,7 @@ def test_the_effects_of_the_campaign_are_those_of_the_theatre_and_together_all_o
         own = _leaves(scene)
         if "sensor.camera.kind" in own:  # a recorder has the camera within it
             own |= {key.replace(".camera", ""): own.pop(key) for key in list(own) if key.startswith("sensor.camera.")}
-        together |= {key: value for key, value in own.items() if first.get(key) != value}
+        together |= {key: value for key, value in own.items() if first.get(key, 0.0) != value}
     theatre = {key.replace("sensor.camera.", "sensor."): value for key, value in _leaves(load_scene("theatre")).items()}
     assert {**together, "sensor.kind": ""} == {**theatre, "sensor.kind": ""}
 
