@@ -7,6 +7,7 @@ map's centre is the chord, and an area that of the map; elsewhere `stretch` tell
 from __future__ import annotations
 
 import functools
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -16,6 +17,7 @@ from conespot.scene import Eye, Scene
 from conespot.scene.surface import Surface
 
 Array = NDArray[np.float64]
+Maps = NDArray[np.float32]
 
 #: side of a cell [mm]
 CELL = 0.02
@@ -48,10 +50,12 @@ class Chart:
         first /= np.linalg.norm(first)
         return np.stack([first, np.cross(self.centre, first)])
 
-    def places(self, directions: Array) -> Array:
+    def places(self, directions: NDArray[np.floating]) -> NDArray[np.floating]:
         """Map coordinates x, y `[..., 2]` [mm] of unit directions `[..., 3]` from the eye's centre."""
-        scale = self.radius * np.sqrt(2.0 / np.maximum(1.0 + directions @ self.centre, 1e-12))
-        return np.asarray(scale[..., None] * (directions @ self.across.T))
+        kind = directions.dtype
+        along = directions @ self.centre.astype(kind)
+        scale = kind.type(self.radius) * np.sqrt(2 / np.maximum(1 + along, kind.type(1e-12)))
+        return np.asarray(scale[..., None] * (directions @ self.across.T.astype(kind)))
 
     def directions(self, places: Array) -> Array:
         """Unit directions `[..., 3]` of map coordinates `[..., 2]` [mm]; all round the eye, those of its far side."""
@@ -77,16 +81,30 @@ class Chart:
 
     def gathered(self, directions: Array, weights: Array) -> Array:
         """Weights `[N]` of unit directions `[N, 3]` as a density [1/mm2] `[side, side]`, each shared by four cells."""
-        at = self.places(directions) / CELL + (self.side - 1) / 2.0
-        corner = np.floor(at).astype(int)
-        part = at - corner
         density = np.zeros(self.side**2)
-        for right, up in ((0, 0), (1, 0), (0, 1), (1, 1)):
-            column, row = corner[:, 0] + right, corner[:, 1] + up
-            share = np.abs(1 - right - part[:, 0]) * np.abs(1 - up - part[:, 1]) * weights
-            inside = (column >= 0) & (column < self.side) & (row >= 0) & (row < self.side)
-            density += np.bincount((row * self.side + column)[inside], share[inside], minlength=self.side**2)
+        for cell, share in self._shares(directions):
+            density += np.bincount(cell, share * weights, minlength=self.side**2)
         return density.reshape(self.side, self.side) / CELL**2
+
+    def read(self, values: Maps, directions: NDArray[np.floating]) -> Maps:
+        """Maps `[K, side, side]` in unit directions `[N, 3]`, between four cells each: `[K, N]`; 0 outside them."""
+        found = np.zeros((len(values), len(directions)), np.float32)
+        for cell, share in self._shares(directions):
+            for layer, out in zip(values.reshape(len(values), -1), found, strict=True):
+                out += layer[cell] * share
+        return found
+
+    def _shares(self, directions: NDArray[np.floating]) -> Iterator[tuple[NDArray[np.int32], NDArray[np.floating]]]:
+        """The four cells about each of the directions `[N, 3]`, and its share in them; 0 for those outside."""
+        x, y = np.moveaxis(self.places(directions), -1, 0) / directions.dtype.type(CELL) + (self.side - 1) / 2
+        column, row = np.floor(x).astype(np.int32), np.floor(y).astype(np.int32)
+        right, up = x - column, y - row
+        inside = (column >= 0) & (column < self.side - 1) & (row >= 0) & (row < self.side - 1)
+        corner = np.where(inside, row * self.side + column, 0)
+        yield corner, (1 - right) * (1 - up) * inside
+        yield corner + 1, right * (1 - up) * inside
+        yield corner + self.side, (1 - right) * up * inside
+        yield corner + self.side + 1, right * up * inside
 
 
 def _even_length(least: float) -> int:

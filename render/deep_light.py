@@ -44,6 +44,8 @@ RAYS = 2**16
 STEP = 25.0
 #: below this no deep light is left to spread in any eye, and the table of kernels ends [nm]
 SHORTEST = 500.0
+#: at which a film is integrated
+_POINTS = 4001
 #: part of the film's response left out at either end
 _TAIL = 1e-3
 _TYPICAL = fundus.SITES["perifovea"]
@@ -55,8 +57,9 @@ class DeepMaps:
     """The integral above over a chart, divided by `typical` t, at each of the wavelengths."""
 
     chart: Chart
-    values: Maps  #: [W m-2 per unit of the film's light] `[wavelengths, side, side]`
-    scale: Array  #: typical t and the light's way through water at whole nanometres from 300 to 1100 `[801]`
+    values: Maps  #: `[W m-2 per unit of the film's light]` `[wavelengths, side, side]`
+    #: what the channels see of a value times t over the typical one, at each wavelength `[C, wavelengths]`
+    weights: Array
 
 
 class DeepLight:
@@ -64,7 +67,7 @@ class DeepLight:
 
     def __init__(self, scene: Scene, retina: Fundus, films: list[Curve]) -> None:
         self.scene, self.retina = scene, retina
-        self.wavelengths = nodes(films)
+        self.wavelengths, self._films = nodes(films), films
         factor = retina.spread.scattering if retina.spread else 1.0
         self.kernels = [spread_kernel(w, retina.pigmentation, factor) for w in self.wavelengths]
         self.reach = max(kernel.reach(LOST) for kernel in self.kernels)
@@ -120,16 +123,30 @@ class DeepLight:
         values = np.empty((len(self.wavelengths), chart.side, chart.side), np.float32)
         for i, (wavelength, kernel) in enumerate(zip(self.wavelengths, self.kernels, strict=True)):
             entered = np.zeros_like(density, dtype=np.float32)
-            entered[lit] = density[lit] * entry.passage(wavelength) / _typical(wavelength)
+            entered[lit] = density[lit] * entry.passage(wavelength) / typical(wavelength)
             transfer = _transfer(chart.side, kernel)
             values[i] = _convolved(entered, transfer)
             if chart.stretch is not None:
                 # even light stays even where the surface has more area than the map
                 values[i] /= _convolved(chart.stretch.astype(np.float32), transfer)
         np.maximum(values, 0.0, out=values)
-        x = np.arange(300.0, 1101.0)
-        water = fundus.water_transmission(x, water_mm) if spectral.has_water(self.scene) else 1.0
-        return DeepMaps(chart, values, _typical(x) * water)
+        return DeepMaps(chart, values, self._weights(water_mm))
+
+    def _weights(self, water_mm: float) -> Array:
+        """Integrals over the films of the typical t, in and out, and so much water, shared between the wavelengths.
+
+        What maps make of the typical t goes in proportion from one of the wavelengths to the next.
+        """
+        rows = []
+        for film in self._films:
+            x = np.linspace(film.low, film.high, _POINTS)
+            light = film(x) * (film.integral() / np.trapezoid(film(x), x))
+            passed = light * typical(x) ** 2 / math.pi
+            if spectral.has_water(self.scene):
+                passed *= fundus.water_transmission(x, water_mm)
+            hats = [np.interp(x, self.wavelengths, one) for one in np.eye(len(self.wavelengths))]
+            rows.append([float(np.trapezoid(passed * hat, x)) for hat in hats])
+        return np.array(rows)
 
 
 class EntryMap:
@@ -184,7 +201,7 @@ def cone_lattice(axis: Array, half_angle: float, count: int) -> tuple[Array, flo
     return rays, 2.0 * math.pi * (1.0 - math.cos(half_angle)) / count
 
 
-def _typical(wavelength: float | Array) -> Array:
+def typical(wavelength: float | Array) -> Array:
     """t of the perifovea without vessels."""
     x = np.asarray(wavelength, float)
     density = _TYPICAL.melanin * fundus.melanin_template(x) + _TYPICAL.macular * fundus.macular_template(x)

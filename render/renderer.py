@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from conespot.render import emitters, kept, kernel, monte_carlo, shaft, spectral
 from conespot.render.blur import Blur
+from conespot.render.deep_light import DeepMaps
 from conespot.render.rim import rim_pixels
 from conespot.render.source import Source, outermost
 from conespot.render.stage import Stage
@@ -85,8 +86,6 @@ class Renderer:
             self._lit.update({"light.intensity.values": emitters.through_water(self.scene, pose, axis)})
         if self._shaft is not None:
             self._lit.update(shaft.placed(self._mi, self._shaft, pose))
-        if self._lit.glow is not None:
-            self._lit.glow.show_spotlight(pose, spotlight)
         self.rendered += 1
         if self.scene.camera.optics is None:
             inside = crop.hull(self._reach(pose, spotlight), self._margin(pose, spotlight))
@@ -94,24 +93,20 @@ class Renderer:
             inside = np.ones((crop.height, crop.width), bool)
         patch = Tile(crop, self._radiance(crop, inside, self._edge(crop, pose, spotlight), seed))
         if self._lit.glow is not None:
-            patch = self._on_glow(patch, inside, pose, spotlight, seed)
+            patch = self._on_glow(patch, pose, spotlight)
         return self._blur.tile(patch)
 
-    def _on_glow(self, patch: Tile, inside: NDArray[np.bool_], pose: Pose, spotlight: int, seed: int) -> Tile:
-        """The tile of what a spotlight reaches, `inside` `[h, w]`, in the middle of the deep light around it.
-
-        There is nothing around it but that, which is smooth and dim: few samples do.
-        """
+    def _on_glow(self, patch: Tile, pose: Pose, spotlight: int) -> Tile:
+        """The tile of what comes back where it falls, with the deep light in it and around it."""
         assert self._lit.glow is not None
         camera = self.scene.camera
         rim = camera.project(self._lit.glow.deep.outline(pose, spotlight))
         crop = Crop.around(np.concatenate([rim, patch.crop.corners]), camera.shape, _MARGIN)
         if camera.optics is not None and not np.isfinite(rim).all():
             crop = Crop.whole(camera.shape)
-        radiance = self._lit.glowing(crop, monte_carlo.PILOT, seed)
+        radiance = self._lit.glowing(crop, self._lit.glow.deep.spotlight(pose, spotlight))
         row, column = patch.crop.row - crop.row, patch.crop.column - crop.column
-        part = radiance[row : row + patch.crop.height, column : column + patch.crop.width]
-        part[inside] = patch.radiance[inside]
+        radiance[row : row + patch.crop.height, column : column + patch.crop.width] += patch.radiance
         return Tile(crop, radiance)
 
     @property
@@ -194,7 +189,7 @@ class Renderer:
         shaded = self._ambient(with_shaft=True)
         shaded.update(shaft.placed(self._mi, self._shaft, pose))
         frame = self._kept_background(sharp=True).copy()
-        frame[crop.slices] = shaded.render(crop, self.samples, BACKGROUND_SEED)
+        frame[crop.slices] = self._in_ambient(shaded, crop, self.samples)
         self.rendered += 1
         return frame if self._blur.is_none else self._blur.frame(frame)
 
@@ -220,9 +215,21 @@ class Renderer:
     def _rendered_background(self) -> Image:
         crop = Crop.whole(self.scene.camera.shape)
         self.rendered += 1
-        frame = self._ambient(with_shaft=False).render(crop, self._background_samples, BACKGROUND_SEED)
+        frame = self._in_ambient(self._ambient(with_shaft=False), crop, self._background_samples)
         frame.flags.writeable = False
         return frame
+
+    def _in_ambient(self, stage: Stage, crop: Crop, samples: int) -> Image:
+        frame = stage.render(crop, samples, BACKGROUND_SEED)
+        if self._deep_ambient is not None:
+            frame += stage.glowing(crop, self._deep_ambient, once=True)
+        return frame
+
+    @functools.cached_property
+    def _deep_ambient(self) -> DeepMaps | None:
+        """The microscope's light that went through the tissue."""
+        glow = self._ambient(with_shaft=False).glow
+        return None if glow is None else glow.deep.ambient()
 
     @property
     def _background_samples(self) -> int:
@@ -233,10 +240,7 @@ class Renderer:
     def _ambient(self, with_shaft: bool) -> Stage:
         samples = self.samples if with_shaft else self._background_samples
         emitter = emitters.ambient(self.scene)
-        stage = self._stage(emitter, self.scene.ambient.illumination, samples, with_shaft, like=self._lit)
-        if stage.glow is not None:
-            stage.glow.show_ambient()
-        return stage
+        return self._stage(emitter, self.scene.ambient.illumination, samples, with_shaft, like=self._lit)
 
     def _stage(
         self, emitter: dict[str, object], light: Light, samples: int, with_shaft: bool, like: Stage | None = None

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from conespot.render import globe, kernel, spectral, wavefront
-from conespot.render.deep_light import DeepLight
+from conespot.render.deep_light import DeepMaps
 from conespot.render.glow import Glow
 from conespot.render.rays import RayGenerator
 from conespot.render.reflectance import Reflectance
@@ -32,6 +32,8 @@ Image = NDArray[np.float32]
 
 #: samples traced in one pass
 PASS = 2**23
+#: pixels that deep light is read for at once
+_GLOWING = 2**19
 
 
 class Stage:
@@ -111,8 +113,8 @@ class Stage:
         self._parameters = [mi.traverse(loaded) for loaded in self._scenes]
         self.glow = None
         if isinstance(scene.retina, Fundus) and scene.retina.spread is not None and self.retina is not None:
-            deep = DeepLight(scene, scene.retina, [channels[i].film for i in self._seen])
-            self.glow = Glow(scene.eye, scene.retina, self.retina, deep)
+            films = [channels[i].film for i in self._seen]
+            self.glow = Glow(scene, scene.retina, self._scenes[0], self.retina, self._rays, films)
 
     @property
     def tells_noise(self) -> bool:
@@ -165,13 +167,15 @@ class Stage:
             values[first : first + size, :, self._seen] = self._wavefront(part, samples, seed, halves=True)
         return values
 
-    def glowing(self, crop: Crop, samples: int, seed: int) -> Image:
-        """The crop's radiance `[h, w, C]` of deep light alone, where the retina has a `glow`."""
+    def glowing(self, crop: Crop, maps: DeepMaps, *, once: bool = False) -> Image:
+        """The crop's radiance `[h, w, C]` of deep light alone, where the retina has a `glow`: see `Glow.seen`."""
+        assert self.glow is not None
+        self._parameters[0].update()
         image = np.zeros((crop.height, crop.width, self.channels), np.float32)
-        flat, pixels, size = image.reshape(-1, self.channels), crop.pixels(self._columns), PASS // samples
-        for first in range(0, len(pixels) if self._seen else 0, size):
-            part = pixels[first : first + size]
-            flat[first : first + size, self._seen] = self._wavefront(part, samples, seed, transport="glow")
+        flat, pixels = image.reshape(-1, self.channels), crop.pixels(self._columns)
+        for first in range(0, len(pixels), _GLOWING):
+            part = slice(first, first + _GLOWING)
+            flat[part, self._seen] = self.glow.seen(pixels[part], maps, once=once)
         return image
 
     def _wavefront(
@@ -180,7 +184,6 @@ class Stage:
         samples: int,
         seed: int,
         halves: bool = False,
-        transport: wavefront.Transport | None = None,
     ) -> Image:
         assert self._rays is not None
         self._parameters[0].update()
@@ -191,11 +194,10 @@ class Stage:
             self._columns,
             samples,
             seed % 2**32,
-            transport=transport or self.transport,
+            transport=self.transport,
             source=self._source,
             grey=self._grey,
             halves=halves,
-            glow=self.glow,
         )
 
     def _traced(self, scene: int, pixels: NDArray[np.uint32], samples: int, seed: int) -> Image:

@@ -9,7 +9,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from conespot.render import kernel
-from conespot.render.glow import Glow
 from conespot.render.rays import RayGenerator
 from conespot.render.source import Source, Standing
 
@@ -18,8 +17,8 @@ if TYPE_CHECKING:
     from mitsuba import RayDifferential3f, SamplingIntegrator, Scene, Spectrum
 
 #: how light comes to what the camera sees: from the emitter, which nothing can hide; from the emitter, unless something
-#: does; by the integrator's paths; or through the tissue alone
-Transport = Literal["unblocked", "direct", "path", "glow"]
+#: does; or by the integrator's paths
+Transport = Literal["unblocked", "direct", "path"]
 
 
 def trace(
@@ -34,7 +33,6 @@ def trace(
     source: Source | None = None,
     grey: Sequence[float] | None = None,
     halves: bool = False,
-    glow: Glow | None = None,
 ) -> NDArray[np.float32]:
     """What the film's channels see `[N, C]` of the pixels `[N]` (row * width + column) of a Mitsuba scene.
 
@@ -94,12 +92,8 @@ def trace(
             bounces.seed(seed, len(pixels) * samples)
             paths = cast("SamplingIntegrator", loaded.integrator())
             light, met, _ = paths.sample(loaded, bounces, ray)
-        case "glow":
-            light, met = mi.Spectrum(0.0), mi.Bool(True)
         case _:
             assert_never(transport)
-    if glow is not None:
-        light += glow.along(loaded, ray)
     met &= seen
     if grey is None:
         values = film.prepare_sample(weight * light, ray.wavelengths, channels, 1.0, 1.0, met)[:-1]

@@ -138,7 +138,7 @@ def test_the_maps_agree_with_a_sum_over_entry_points_at_their_chords(surface):
     rng = np.random.default_rng(2)
     cells = rng.integers(maps.chart.side // 5, 4 * maps.chart.side // 5, (30, 2))
     density = spread_kernel(850.0, "medium")
-    typical = maps.scale[550] / float(fundus.water_transmission(850.0, _water(scene, pose, axis)))
+    typical = float(deep_light.typical(850.0))
     found, summed = [], []
     for row, column in cells:
         place = scene.surface.points(scene.eye, maps.chart.cells[row, column])
@@ -146,10 +146,6 @@ def test_the_maps_agree_with_a_sum_over_entry_points_at_their_chords(surface):
         found.append(maps.values[0, row, column])
     assert max(summed) > 5.0 * min(summed)
     np.testing.assert_allclose(found, summed, atol=0.02 * float(maps.values.max()))
-
-
-def _water(scene, pose, axis):
-    return float(np.linalg.norm(scene.surface.intersect(scene.eye, pose.apex, axis) - pose.apex))
 
 
 @pytest.mark.slow
