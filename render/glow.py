@@ -53,6 +53,7 @@ class Glow:
         self.deep = DeepLight(scene, retina, films)
         self._scene, self._loaded, self._shape, self._camera = scene, loaded, shape, camera
         self._alone = len(loaded.shapes()) == 1
+        self._closed = self._alone and not shape.is_mesh()  # met in closed form, in the kernel itself
         self._texture: Any = fundus_texture(self._mi, self._dr, fundus_maps(retina), retina, EXTENT, "passage")
         self._typical = typical(np.array(self.deep.wavelengths)).astype(np.float32)
         self._known: NDArray[np.bool_] | None = None
@@ -96,8 +97,8 @@ class Glow:
 
     @property
     def _across(self) -> int:
-        """Rays along a pixel's side."""
-        return min(_MOST, math.ceil(self._scene.camera.pixel_pitch / _BETWEEN))
+        """Rays along a pixel's side; where each takes its place in the lens' pupil, there are many."""
+        return _MOST if self._camera.has_aperture else min(_MOST, math.ceil(self._scene.camera.pixel_pitch / _BETWEEN))
 
     def _pass(self, pixels: NDArray[np.uint32]) -> tuple[Image, Image]:
         mi, dr, n = self._mi, self._dr, self._across
@@ -105,6 +106,11 @@ class Glow:
         pixel, k = dr.gather(mi.UInt32, mi.UInt32(pixels), lane // n**2), lane % n**2
         columns = self._scene.camera.shape[1]
         x, y = mi.Float(pixel % columns) + (k % n + 0.5) / n, mi.Float(pixel // columns) + (k // n + 0.5) / n
+        place = None
+        if self._camera.has_aperture:  # cells of the pupil, paired with those of the pixel in its own way
+            cell = mi.permute_kensler(k, n**2, mi.sample_tea_32(pixel, 0)[0])
+            unit = mi.Point2f((mi.Float(cell % n) + 0.5) / n, (mi.Float(cell // n) + 0.5) / n)
+            place = mi.warp.square_to_uniform_disk_concentric(unit)
         # as constants they would make another kernel of every light
         wavelengths = [dr.opaque(mi.Float, wavelength) for wavelength in self.deep.wavelengths]
         # four at a time, the last ones again where there are no more; through optics each has a way of its own
@@ -115,7 +121,7 @@ class Glow:
             four = [
                 wavelengths[min(first + i, len(wavelengths) - 1)] if step == 4 else wavelengths[first] for i in range(4)
             ]
-            passed, away = self._along(x, y, mi.UnpolarizedSpectrum(*four))
+            passed, away = self._along(x, y, mi.UnpolarizedSpectrum(*four), place)
             found += [dr.block_sum(passed[i], n**2) for i in range(min(step, len(wavelengths) - first))]
             ways.append(away)
         direction = [dr.block_sum(part, n**2) for part in ways[len(ways) // 2]]
@@ -125,11 +131,11 @@ class Glow:
         passage = np.stack([np.asarray(part) for part in found]) / np.float32(n**2)
         return passage.astype(np.float32), np.asarray(there / np.maximum(length, 1e-6), np.float32)
 
-    def _along(self, x: Any, y: Any, wavelengths: Any) -> tuple[Any, Any]:
+    def _along(self, x: Any, y: Any, wavelengths: Any, place: Any) -> tuple[Any, Any]:
         """t of film positions, and the direction from the eye's centre; 0 where there is no retina, or the shaft."""
         mi, dr = self._mi, self._dr
-        ray, seen = self._camera.rays(x, y, wavelengths)
-        at = (self._shape if self._alone else self._loaded).ray_intersect(ray)
+        ray, seen = self._camera.rays(x, y, wavelengths, place)
+        at = (self._shape if self._closed else self._loaded).ray_intersect(ray)
         active = at.is_valid() & seen
         if not self._alone:
             active &= at.shape == mi.ShapePtr(self._shape)
