@@ -73,7 +73,7 @@ def _text(comparisons: Sequence[Comparison], exposures: dict[str, RetinalExposur
     lines = ["Position errors, paired pose by pose; a pose counts once, with its median over the powers.", ""]
     for c in comparisons:
         lines += [c.sentence, ""]
-        lines += [f"  {_line(row)}" for row in c.table.to_dict("records")]
+        lines += [f"  {_line(row, c.swept)}" for row in c.table.to_dict("records")]
         lines.append("")
     lines += [*assumed.values(), ""]
     lines.append("Retinal exposure at the highest power, worst over the poses:")
@@ -81,9 +81,9 @@ def _text(comparisons: Sequence[Comparison], exposures: dict[str, RetinalExposur
     return "\n".join(lines) + "\n"
 
 
-def _line(row: dict[Hashable, Any]) -> str:
+def _line(row: dict[Hashable, Any], swept: Sequence[str]) -> str:
     """One setting at one power."""
-    setting = ", ".join(str(row[name]) for name in ("trajectory", "spotlights", "surface"))
+    setting = ", ".join(str(row[name]) for name in ("trajectory", "spotlights", "surface", *swept))
     counts = f"{row['pairs']} pairs, failed {row['failed_b']} and {row['failed_a']} of {row['poses']}"
     if not row["pairs"]:
         return f"{setting}, {row['power_w']:g} W: {counts}"

@@ -57,6 +57,7 @@ class Comparison:
     localizer: str
     table: pd.DataFrame
     overall: Difference  #: a pose counts once, with its median difference over the powers
+    swept: tuple[str, ...] = ()  #: what else is swept alike in both lights, columns of `table`
 
     @property
     def sentence(self) -> str:
@@ -116,7 +117,7 @@ def compare_lights(rows: Sequence[Rows], a: str, b: str, source: str) -> list[Co
         for values, here in mine.groupby(groups, sort=False):
             lines.append({**dict(zip(groups, values, strict=True)), **vars(difference(here))})
         overall = _overall(mine, [*_FRAME, *shared, "pose"])
-        found.append(Comparison(a, b, str(localizer), pd.DataFrame(lines), overall))
+        found.append(Comparison(a, b, str(localizer), pd.DataFrame(lines), overall, tuple(shared)))
     return found
 
 
