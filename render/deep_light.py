@@ -160,7 +160,7 @@ class EntryMap:
         layers = _coarse_layers(retina)
         # remap takes no more than four channels, and no row longer than 32767
         width = 4096
-        pad = -len(arc) % width
+        pad = max(-len(arc) % width, width - len(arc))  # a row at least: where no light falls there is no place
         x, y = (np.pad(values, (0, pad)).reshape(-1, width) for values in (column, row))
         sampled = [cv2.remap(layer, x, y, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE) for layer in layers]
         self._values = [values.ravel()[: len(arc)] for values in sampled]

@@ -154,3 +154,15 @@ def test_the_scalar_variant_refuses_spread_in_one_sentence():
     done = subprocess.run([sys.executable, "-c", code], env=environment, capture_output=True, text=True)
     assert done.returncode == 1
     assert "retina.spread needs a JIT variant, and this is scalar_spectral" in done.stderr.splitlines()[-1]
+
+
+def test_without_any_microscope_light_there_is_no_deep_light_of_it():
+    scene = Scene.model_validate(
+        {
+            "camera": {"resolution": 60},
+            "retina": {"kind": "fundus", "spread": {}},
+            "ambient": {"irradiance": "0 W/m2"},
+            "illumination": "ir850",
+        }
+    )
+    assert not np.any(Renderer(scene, samples=4).background())
