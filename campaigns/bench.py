@@ -12,7 +12,7 @@ import numpy as np
 
 from conespot.campaigns.maker import made_with, maker
 from conespot.campaigns.plan import Case, Group, Plan, Unit, frame_seed, reference_seed, tile_seed, told
-from conespot.campaigns.row import Finding, Record
+from conespot.campaigns.row import FARTHEST, Finding, Record
 from conespot.localize import LocalizationFailure, find_localizer, locate
 from conespot.localize.image import AnyImage, Reference
 from conespot.localize.outcome import Outcome
@@ -200,6 +200,8 @@ def finding(case: Case, localizer: str, found: Outcome, bound: float | None) -> 
     """An answer as a run keeps it."""
     if isinstance(found, LocalizationFailure):
         return Finding(case=case.key, localizer=localizer, reason=found.reason[:1000], bound=bound)
+    if np.max(np.abs(found.apex_mm)) > FARTHEST:
+        return Finding(case=case.key, localizer=localizer, reason="the tip is out of this world", bound=bound)
     return Finding(
         case=case.key,
         localizer=localizer,

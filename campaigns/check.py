@@ -10,17 +10,17 @@ from conespot.scene import InputError
 
 @dataclass(frozen=True)
 class Checked:
-    """The verdicts as `text`; `missed` says how many do not hold."""
+    """The verdicts as `text`; `missed` says how many do not hold, `unclear` what this run can neither meet nor miss."""
 
     text: str
     missed: int
+    unclear: str
 
 
 def check_run(folder: Path, campaign: str | None, junit_file: Path | None, markdown_file: Path | None) -> Checked:
     """Compare a run with what the file `campaign` expects, by default its own; writes JUnit XML and markdown.
 
-    Raises InputError for a folder that is no run, where nothing is expected, and, after everything is written, for
-    expectations that this run cannot meet or miss: nothing, or more than one number, is what they are about.
+    Raises InputError for a folder that is no run, and where nothing is expected.
     """
     from conespot.campaigns.schema import read_campaign
     from conespot.results.check import check, expected, verdict_table
@@ -38,9 +38,8 @@ def check_run(folder: Path, campaign: str | None, junit_file: Path | None, markd
         write_atomically(junit_file, junit(run.name, verdicts), "--junit")
     if markdown_file is not None:
         write_atomically(markdown_file, table.markdown().encode(), "--markdown")
-    unclear = [(i, v) for i, v in enumerate(verdicts) if v.unclear]
-    if unclear:
-        i, first = unclear[0]
-        more = f" (and {len(unclear) - 1} more)" if len(unclear) > 1 else ""
-        raise InputError(f"{document.place(('expect', i))}: {first.title}: {first.unclear}{more}")
-    return Checked(table.text(), sum(not v.holds for v in verdicts))
+    # nothing, or more than one number, is what these are about
+    unclear = [f"{document.place(('expect', i))}: {v.title}: {v.unclear}" for i, v in enumerate(verdicts) if v.unclear]
+    more = f" (and {len(unclear) - 1} more)" if len(unclear) > 1 else ""
+    text = table.text() if len(unclear) < len(verdicts) else ""
+    return Checked(text, sum(not v.holds and not v.unclear for v in verdicts), "".join(unclear[:1]) + more)

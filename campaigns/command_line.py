@@ -62,6 +62,12 @@ def _add_campaigns(add: _Add) -> None:
     add(subcommands.show, "print a campaign's file").add_argument("campaign")
 
 
+def _text(text: str) -> str:
+    if not text.strip():
+        raise argparse.ArgumentTypeError("is empty, which every reason holds")
+    return text
+
+
 def _add_runs(add: _Add) -> None:
     """What looks at a run, or goes on with it."""
     status = add(subcommands.status, "say how far a run is, while it goes or after, and why poses failed")
@@ -70,7 +76,8 @@ def _add_runs(add: _Add) -> None:
     retry.add_argument("folder", type=Path, metavar="RUN")
     which = retry.add_mutually_exclusive_group(required=True)
     which.add_argument("--failed", action="store_true", help="those that were lost to an error")
-    which.add_argument("--reason", metavar="TEXT", help="those with a frame that failed for a reason that holds TEXT")
+    reason = "those with a frame that failed for a reason that holds TEXT"
+    which.add_argument("--reason", metavar="TEXT", type=_text, help=reason)
     add_machines(retry)
     retry.add_argument("--log", metavar="FILE", type=Path, help="as for run")
     report = add(subcommands.report, "make the tables, figures and report of a run folder again")

@@ -27,6 +27,7 @@ from conespot.scene.quantity import Seconds
 Line = Annotated[str, StringConstraints(min_length=1, max_length=1000, pattern=r"^[^\r\n\x00]*$")]
 _LOCAL = {"inproc"}  #: protocols that never leave the process
 _SECRET = {"tls", "wss"}
+_SCHEMES = _LOCAL | _SECRET | {"tcp", "ucx", "ws"}
 
 
 def _beside(value: object, info: ValidationInfo) -> object:
@@ -64,7 +65,7 @@ class Scheduler(_Machines):
     """Workers of a scheduler that somebody else has started."""
 
     kind: Literal["scheduler"]
-    address: Annotated[Line, Field(pattern=r"^[a-z]+://\S+$")]
+    address: Line
     workers: Annotated[int, Field(ge=1)] = 1  #: how many there are, for the time that a plan promises
     tls: Tls | None = None
     insecure: bool = False
@@ -72,6 +73,12 @@ class Scheduler(_Machines):
     @model_validator(mode="after")
     def _trusted(self) -> Scheduler:
         parts = urlsplit(self.address)
+        try:
+            known = parts.scheme in _SCHEMES and bool(parts.netloc) and parts.port != 0
+        except ValueError:  # a port that no machine has
+            known = False
+        if not known:
+            raise ValueError(f"address '{self.address}' must be one of Dask's, such as tls://HOST:8786")
         if not (self.insecure or parts.scheme in _LOCAL | _SECRET or _is_loopback(parts.hostname or "")):
             raise ValueError(
                 f"{self.address} is neither this machine nor TLS, and whoever reaches Dask's wire can run code at both "

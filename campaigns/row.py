@@ -18,6 +18,9 @@ if TYPE_CHECKING:
     pass
 
 Vector = tuple[FiniteFloat, FiniteFloat, FiniteFloat]
+#: a tip farther than this [mm] is no answer: rows hold errors up to ten times that
+FARTHEST = 1e8
+_Coordinate = Annotated[FiniteFloat, Field(ge=-FARTHEST, le=FARTHEST)]
 Row = dict[str, float]
 _NAN = math.nan
 _NOWHERE = (_NAN, _NAN, _NAN)
@@ -35,7 +38,7 @@ class Finding(_Line):
     case: str = Field(max_length=64)
     localizer: str = Field(max_length=64)
     reason: str = Field("", max_length=1000)
-    apex: Vector | None = None  #: [mm]
+    apex: tuple[_Coordinate, _Coordinate, _Coordinate] | None = None  #: [mm]
     axis: Vector | None = None
     roll: FiniteFloat | None = None  #: [rad], of localizers that measure it
     #: of the apex [mm], the axis along two tangents [rad] and, with six rows, the roll [rad]

@@ -118,8 +118,13 @@ def check(options: argparse.Namespace) -> Ending:
     from conespot.campaigns.check import check_run
 
     checked = check_run(options.folder, options.campaign, options.junit, options.markdown)
-    _say(checked.text)
-    return _fail(f"{checked.missed} expectations missed", Ending.FAILED) if checked.missed else Ending.DONE
+    if checked.text:
+        _say(checked.text)
+    if checked.missed:
+        _fail(f"{checked.missed} expectations missed", Ending.FAILED)
+    if checked.unclear:
+        return _fail(checked.unclear, Ending.BAD_INPUT)
+    return Ending.FAILED if checked.missed else Ending.DONE
 
 
 def debug(options: argparse.Namespace) -> Ending:

@@ -7,11 +7,11 @@ A profile g is relative, 1 on the axis and 0 outside the cone. `flux_factor` is 
 from __future__ import annotations
 
 import math
-from typing import Annotated, Literal, Protocol
+from typing import Annotated, Any, Literal, Protocol
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from pydantic import Field, model_validator
+from pydantic import Field, SerializerFunctionWrapHandler, model_serializer, model_validator
 
 from conespot.scene.model import Model
 from conespot.scene.quantity import Angle, Length, format_quantity
@@ -57,6 +57,14 @@ class _Cored(Model):
     """
 
     source_diameter: Annotated[Length, Field(ge=0.0, le=1.0)] = 0.0  #: 0 for a point [mm]
+
+    @model_serializer(mode="wrap")
+    def _point_unsaid(self, dump: SerializerFunctionWrapHandler) -> dict[str, Any]:
+        """A point source is not written, so that a swept beam is called as it was before there were cores."""
+        data: dict[str, Any] = dump(self)
+        if not self.source_diameter:
+            data.pop("source_diameter", None)
+        return data
 
     @property
     def _core(self) -> str:

@@ -84,6 +84,17 @@ def test_check_judges_by_another_campaign_and_fails_for_a_miss(run, capsys, tmp_
     assert "1 expectations missed" in said.err
 
 
+def test_check_prints_what_it_judged_beside_what_it_cannot(run, capsys, tmp_path):
+    other = tmp_path / "other.yaml"
+    missed, unclear = EXPECT.replace("0.49", "0.4"), EXPECT.replace("9}", "8}").split("\n", 1)[1]
+    other.write_text("theory: [table-1]\n" + missed + unclear)
+    assert main(["check", str(run), "--campaign", str(other)]) == 2
+    said = capsys.readouterr()
+    assert "MISSES" in said.out
+    assert "1 expectations missed" in said.err
+    assert "no line with 8" in said.err
+
+
 def test_check_refuses_what_cannot_be_judged_and_where_nothing_is_expected(run, capsys, tmp_path):
     other = tmp_path / "other.yaml"
     other.write_text("theory: [table-1]\n" + EXPECT.replace("9}", "8}"))

@@ -155,9 +155,10 @@ def test_a_scheduler_over_the_open_network_is_refused_unless_the_profile_trusts_
     assert read(f"kind: scheduler\naddress: {address}\ninsecure: true\n").insecure
 
 
-def test_an_address_that_is_none_is_refused():
-    with pytest.raises(InputError, match="--scheduler: address: "):
-        scheduler_at("cluster:8786")
+@pytest.mark.parametrize("address", ["here", "http://127.0.0.1:8786", "tcp://127.0.0.1:99999", "tls://"])
+def test_an_address_that_is_none_is_refused(address):
+    with pytest.raises(InputError, match="--scheduler: .*must be one of Dask's, such as tls://HOST:8786"):
+        scheduler_at(address)
 
 
 def test_the_profiles_that_the_docs_show_can_be_read(read, certificates):

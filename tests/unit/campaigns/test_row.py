@@ -30,6 +30,11 @@ def test_the_columns_are_those_of_the_design_in_its_order():
     assert list(row) == [*xyz, *rest]
 
 
+def test_a_tip_out_of_this_world_is_no_finding():
+    with pytest.raises(ValidationError):
+        found([1e300, 0.0, 0.0], [0.0, 0.0, 1.0])
+
+
 def test_position_errors_are_estimate_minus_truth():
     row = errors(Pose.through([1.0, 2.0, 4.0], RCM), found([1.03, 2.0, 3.96]), RCM)
     assert [row[f"error_{c}_mm"] for c in "xyz"] == pytest.approx([0.03, 0.0, -0.04])
