@@ -34,6 +34,7 @@ def test_white_led_has_its_published_chromaticity():
     assert xyz[:2] / xyz.sum() == pytest.approx([0.3756, 0.3723], abs=0.002)
 
 
+@pytest.mark.slow
 def test_a_fundus_is_red_and_infrared_is_dark():
     """Colour previews of a fundus; white LED against red > green > blue, IR 940 nm against black."""
     pose_at = np.array([0.0, 0.0, 5.0])

@@ -126,6 +126,7 @@ def test_through_the_eyes_optics_deep_light_is_as_much_as_in_the_closed_form(len
     assert seen == pytest.approx(expected, rel=0.01)
 
 
+@pytest.mark.slow
 def test_over_bumps_and_beside_a_shaft_deep_light_is_what_is_not_hidden():
     """The tile over bumps: its sum as without spread; with a shaft, what it hides is dark and the rest as before."""
     bumps = SURFACES["bumps"]
@@ -144,6 +145,7 @@ def test_over_bumps_and_beside_a_shaft_deep_light_is_what_is_not_hidden():
     assert np.mean((whole | hidden)[lit]) > 0.95
 
 
+@pytest.mark.slow
 def test_the_scalar_variant_refuses_spread_in_one_sentence():
     code = (
         "from conespot.render.renderer import Renderer; from conespot.scene import Scene\n"

@@ -10,6 +10,7 @@ from conespot.localize.calibration import NAMES, calibrate
 from conespot.scene.beam import CyclesBeam, HardBeam
 
 
+@pytest.mark.slow
 def test_calibration_finds_the_half_angle_of_a_rig_and_says_that_the_size_of_the_scene_is_hidden():
     true = scene_of(HardBeam(half_angle=math.radians(9.03)), "triple")
     believed = scene_of(HardBeam(), "triple")
