@@ -157,7 +157,16 @@ def in_process(read: Callable[[], object], seconds: float) -> tuple[str, float]:
     except Exception as error:
         at = traceback.extract_tb(error.__traceback__)[-1]
         said = f"{type(error).__name__}: {str(error)[:200]} ({Path(at.filename).name}:{at.lineno})"
-    return said, resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * 1024 / 1e6
+    return said, most_memory()
+
+
+def most_memory() -> float:
+    """What this process held at most [MB]; `getrusage` would count what its parent held when it started it."""
+    status = Path("/proc/self/status")
+    if status.exists():
+        line = next(line for line in status.read_text().splitlines() if line.startswith("VmHWM:"))
+        return int(line.split()[1]) * 1024 / 1e6
+    return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * 1024 / 1e6
 
 
 def by_command(arguments: list[str], folder: Path, seconds: float) -> tuple[str, float]:
@@ -182,8 +191,8 @@ def by_command(arguments: list[str], folder: Path, seconds: float) -> tuple[str,
     missed = name == "check" and code == 1 and last.startswith("campaign: ") and "expectations missed" in last
     if not traced and (code == 0 or missed):
         return "valid", peak
-    # `report` names the damaged lines of a journal before it ends
-    refused = code == 2 and last.startswith("campaign: ") and (len(lines) == 1 or name == "report")
+    # `report` names the damaged lines of a journal before it ends, `check` what was missed
+    refused = code == 2 and last.startswith("campaign: ") and (len(lines) == 1 or name in ("report", "check"))
     return "refused" if refused and not traced else f"{name}: exit code {code}: {lines[-3:]}", peak
 
 

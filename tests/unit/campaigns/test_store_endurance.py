@@ -23,14 +23,19 @@ TEXT = "scene: paper\nposes: 400\nlocalizers: [paper]\n"
 
 
 class AtOnce:
-    """An executor without workers that answers the truth, and writes into a file which poses it was asked for."""
+    """An executor without workers that answers the truth, and writes into a file which poses it was asked for.
 
-    def __init__(self, asked):
-        self.asked = asked
+    After `most` of them it waits to be killed.
+    """
+
+    def __init__(self, asked, most=400):
+        self.asked, self.most = asked, most
 
     def execute(self, plan, units, *, frames, note):
         with open(self.asked, "ab", buffering=0) as asked:
-            for unit in units:
+            for number, unit in enumerate(units):
+                if number == self.most:
+                    time.sleep(3600.0)
                 asked.write(f"{unit.key}\n".encode())
                 pose = plan.groups[unit.group].pose(unit.pose)
                 true = {"apex": tuple(map(float, pose.apex)), "axis": tuple(map(float, pose.axis))}
@@ -90,14 +95,15 @@ def finished(folder, plan):
 
 @pytest.mark.slow
 def test_killed_at_fifty_moments_nothing_is_lost_or_run_twice(tmp_path, document, undisturbed):
-    """kill -9 of the process that owns the journal, after one to eight poses more, or while it writes rows."""
+    """kill -9 of the process that owns the journal, a moment after one to eight poses more, or while it waits."""
     folder, plan, moment = tmp_path / "run", make_plan(document), random.Random(1)
     fork = multiprocessing.get_context("fork")
     for kill in range(50):
         before, asked = finished(folder, plan), tmp_path / f"asked-{kill}"
-        process = fork.Process(target=carry_out, args=(document, folder, AtOnce(asked)))
+        more = moment.randint(1, 7)
+        process = fork.Process(target=carry_out, args=(document, folder, AtOnce(asked, more + 1)))
         process.start()
-        wanted = len(before) + moment.randint(1, 8)
+        wanted = lines_in(folder / "journal.jsonl") + more
         while lines_in(folder / "journal.jsonl") < wanted and process.is_alive():
             time.sleep(0.0005)
         time.sleep(moment.random() * 0.004)
