@@ -78,7 +78,7 @@ class Exposure:
         self._background = background
         self.sensor = sensor
         self._recorder = sensor if isinstance(sensor, Recorded) else None
-        self._camera = sensor.camera if isinstance(sensor, Recorded) else sensor
+        self._camera = sensor.camera
         match self._camera:
             case Srgb8() | Linear() as plain:
                 self._encoded = encode(background, plain)
@@ -93,14 +93,14 @@ class Exposure:
 
         `seed` decides the noise of an EMVA 1288 camera; a Bayer camera's raw frame is interpolated to three channels.
         """
-        lit = [tile for tile in tiles if tile.radiance.size]
+        lit = _lit(tiles)
         match self._camera:
             case Emva() as camera:
                 return self._kept(self._noisy(camera, lit, power_w, seed))
             case Srgb8() | Linear() as sensor:
                 image = self._encoded.copy()
-                if lit:
-                    crop, radiance = self._lit(lit, power_w)
+                if lit is not None:
+                    crop, radiance = self._seen(lit, power_w)
                     image[crop.slices] = encode(radiance, sensor)
                 return self._kept(image[..., 0] if image.shape[-1] == 1 else image)
             case unknown:
@@ -116,7 +116,7 @@ class Exposure:
 
         Without noise no frame is copied: what the tiles touch is exposed, and taken back.
         """
-        lit = [tile for tile in tiles if tile.radiance.size]
+        lit = _lit(tiles)
         match self._camera:
             case Emva() as camera:
                 yield self._kept(self._noisy(camera, lit, power_w, seed))
@@ -125,8 +125,8 @@ class Exposure:
                 canvas = self._encoded.copy() if self._canvas is None else self._canvas
                 self._canvas, touched = None, []
                 try:
-                    if lit:
-                        crop, radiance = self._lit(lit, power_w)
+                    if lit is not None:
+                        crop, radiance = self._seen(lit, power_w)
                         touched.append(crop.slices)
                         canvas[crop.slices] = encode(radiance, sensor)
                     image = canvas[..., 0] if canvas.shape[-1] == 1 else canvas[:]
@@ -143,7 +143,7 @@ class Exposure:
         """The image without spotlights, at the exposure of the frame with these tiles at `power_w` [W]."""
         match self._camera:
             case Emva() as camera:
-                lit = [tile for tile in tiles if tile.radiance.size]
+                lit = _lit(tiles)
                 return self._kept(self._digital(self._for_frame(camera, lit, power_w), self._background, seed))
             case Srgb8() | Linear():
                 return self.frame((), 0.0)
@@ -160,40 +160,38 @@ class Exposure:
         """The sensor with the exposure time that its metering asks for in this frame, and keeps; else as it is."""
         match self._camera:
             case Emva() as camera:
-                timed = self._metered(camera, [tile for tile in tiles if tile.radiance.size], power_w)
+                timed = self._metered(camera, _lit(tiles), power_w)
                 return timed if self._recorder is None else self._recorder.model_copy(update={"camera": timed})
             case Srgb8() | Linear():
                 return self.sensor
             case unknown:
                 assert_never(unknown)
 
-    def _lit(self, tiles: Sequence[Tile], power_w: float) -> tuple[Crop, NDArray[np.float32]]:
-        """What the tiles change of the frame, and its radiance: all of it where there is glare."""
-        tile = merged(tiles)
+    def _seen(self, tile: Tile, power_w: float) -> tuple[Crop, NDArray[np.float32]]:
+        """What a tile changes of the frame, and its radiance: all of it where there is glare."""
         if tile.glare is None:
             return tile.crop, self._background[tile.crop.slices] + np.float32(power_w) * tile.radiance
         radiance = self._background + np.float32(power_w) * tile.glare
         radiance[tile.crop.slices] += np.float32(power_w) * tile.radiance
         return Crop.whole(radiance.shape[:2]), radiance
 
-    def _noisy(self, camera: Emva, lit: Sequence[Tile], power_w: float, seed: int) -> Pixels:
+    def _noisy(self, camera: Emva, lit: Tile | None, power_w: float, seed: int) -> Pixels:
         signal = self._background
-        if lit:
-            crop, radiance = self._lit(lit, power_w)
+        if lit is not None:
+            crop, radiance = self._seen(lit, power_w)
             signal = signal.copy()
             signal[crop.slices] = radiance
         return self._digital(self._for_frame(camera, lit, power_w), signal, seed)
 
-    def _metered(self, camera: Emva, lit: Sequence[Tile], power_w: float) -> Emva:
-        if camera.metering is None or not lit:
+    def _metered(self, camera: Emva, lit: Tile | None, power_w: float) -> Emva:
+        if camera.metering is None or lit is None:
             return camera
-        crop, signal = self._lit(lit, power_w)
-        tile = merged(lit)
-        reached = tile.radiance.max(axis=-1) > 0.0
-        signal = signal[tile.crop.within(crop)][reached]
+        crop, signal = self._seen(lit, power_w)
+        reached = lit.radiance.max(axis=-1) > 0.0
+        signal = signal[lit.crop.within(crop)][reached]
         return camera.model_copy(update={"exposure_time": emva.metered_time(signal, camera)})
 
-    def _for_frame(self, camera: Emva, lit: Sequence[Tile], power_w: float) -> Emva:
+    def _for_frame(self, camera: Emva, lit: Tile | None, power_w: float) -> Emva:
         """The camera as it takes one frame: metered anew where it does that for each."""
         anew = camera.metering is not None and camera.metering.each == "frame"
         return self._metered(camera, lit, power_w) if anew else camera
@@ -202,6 +200,12 @@ class Exposure:
     def _digital(camera: Emva, signal: NDArray[np.float32], seed: int) -> Pixels:
         raw = emva.expose(signal, camera, seed)
         return emva.demosaic(raw) if signal.shape[-1] == 3 else raw
+
+
+def _lit(tiles: Sequence[Tile]) -> Tile | None:
+    """The tiles' sum; None if they are empty."""
+    lit = [tile for tile in tiles if tile.radiance.size]
+    return merged(lit) if lit else None
 
 
 def merged(tiles: Sequence[Tile]) -> Tile:

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from conespot.scene.emva import Emva
-from conespot.scene.sensor import AnySensor, Linear, Recorded, Srgb8
+from conespot.scene.sensor import Linear, SingleFrame, Srgb8
 
 #: samples a pixel that are enough in the smooth interior of a patch, and tell where they are not
 PILOT = 4
@@ -20,7 +20,7 @@ _WINDOW = 5
 _SHARE = 1.0 / 3.0
 
 
-def tolerance(sensor: AnySensor) -> float:
+def tolerance(sensor: SingleFrame) -> float:
     """Standard deviation of a pixel's radiance, relative to it, that the sensor forgives whatever the power.
 
     Of pixel values without noise of their own it moves none by more than half a level: white none, and a darker one
@@ -34,8 +34,6 @@ def tolerance(sensor: AnySensor) -> float:
             return 0.5 / sensor.full_scale
         case Emva():
             return _SHARE * math.sqrt(sensor.saturation + sensor.read_noise**2) / sensor.saturation
-        case Recorded():
-            return tolerance(sensor.camera)
         case _:
             assert_never(sensor)
 

@@ -59,7 +59,7 @@ class Renderer:
         self.scene = scene
         self.samples, self.edge_samples = samples, edge_samples
         self._blur = Blur(scene.camera)
-        self.noise = monte_carlo.tolerance(scene.sensor) if noise is None else noise
+        self.noise = monte_carlo.tolerance(scene.sensor.camera) if noise is None else noise
         self.noise *= self._blur.steadiness  # it is rendered sharp and then spread
         self.rendered = 0  #: tiles and backgrounds rendered so far
         self._mi, _, self._kernel = kernel.load()

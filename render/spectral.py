@@ -16,7 +16,7 @@ from conespot.scene import Scene, fundus, media
 from conespot.scene.emva import Emva
 from conespot.scene.illumination import Light
 from conespot.scene.optics import Optics
-from conespot.scene.sensor import Linear, Recorded, Srgb8
+from conespot.scene.sensor import Linear, Srgb8
 from conespot.scene.spectrum import Curve
 
 #: up to this many points a spectrum is given to Mitsuba as it is
@@ -35,7 +35,7 @@ class Channel:
 
 def unit(scene: Scene) -> str:
     """Unit of what the film integrates: radiance, or weighted with a camera's responsivity."""
-    match scene.sensor.camera if isinstance(scene.sensor, Recorded) else scene.sensor:
+    match scene.sensor.camera:
         case Srgb8() | Linear():
             return "W m-2 sr-1"
         case Emva():

@@ -126,6 +126,11 @@ class Emva(Model):
         return self
 
     @property
+    def camera(self) -> Emva:
+        """Itself: nothing records it."""
+        return self
+
+    @property
     def full_scale(self) -> int:
         """Largest pixel value."""
         return int(2**self.bits - 1)

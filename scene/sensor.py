@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-import dataclasses
 from collections.abc import Hashable
+from dataclasses import replace
 from typing import Annotated, Literal, Protocol
 
 import numpy as np
@@ -26,6 +26,10 @@ class ImageSensor(Hashable, Protocol):
 
     A share of 1 is the largest pixel value, a signal of 1 is white: the light that just shows as that.
     """
+
+    @property
+    def camera(self) -> SingleFrame:
+        """What exposes the frames: itself, or what a recorder records."""
 
     @property
     def full_scale(self) -> int:
@@ -77,6 +81,11 @@ class Srgb8(Model):
     kind: Literal["srgb8"] = "srgb8"
     white: _White = 1.0
     colour: bool = Field(False, strict=True)
+
+    @property
+    def camera(self) -> Srgb8:
+        """Itself: nothing records it."""
+        return self
 
     @property
     def full_scale(self) -> int:
@@ -136,6 +145,11 @@ class Linear(Model):
     kind: Literal["linear"] = "linear"
     white: _White = 1.0
     bits: int = Field(12, ge=1, le=16)
+
+    @property
+    def camera(self) -> Linear:
+        """Itself: nothing records it."""
+        return self
 
     @property
     def full_scale(self) -> int:
@@ -239,8 +253,7 @@ class Recorded(Model):
     @property
     def noise(self) -> SensorNoise:
         """The camera's, the codes' and what the compression rounds where an image is busy."""
-        rounding = jpeg.rounding_error(self.quality)
-        return dataclasses.replace(self.camera.noise, levels=self.codes, srgb=True, compression=rounding)
+        return replace(self.camera.noise, levels=self.codes, srgb=True, compression=jpeg.rounding_error(self.quality))
 
     @property
     def responses(self) -> dict[str, Curve] | None:

@@ -20,7 +20,7 @@ from conespot.scene.document import InputError
 from conespot.scene.emva import Emva
 from conespot.scene.pose import Pose
 from conespot.scene.scene import Scene
-from conespot.scene.sensor import Linear, Recorded, Srgb8
+from conespot.scene.sensor import Linear, Srgb8
 from conespot.scene.surface import bump_grid
 
 Record = dict[str, str | float]
@@ -61,15 +61,13 @@ def electrons_of(scene: Scene) -> Electrons:
 
     Without metering a camera's brightest light is taken to be 80 % of saturation.
     """
-    match scene.sensor:
+    match scene.sensor.camera:
         case Srgb8() | Linear():
             return Electrons()
         case Emva() as camera:
             level = camera.metering.level if camera.metering else THEORY.metered_level
             background = math.sqrt(camera.read_noise**2 + 1.0 / (12.0 * camera.gain**2))
             return Electrons(level * camera.saturation, background)
-        case Recorded() as recorder:
-            return electrons_of(scene.model_copy(update={"sensor": recorder.camera}))
         case unknown:
             assert_never(unknown)
 
