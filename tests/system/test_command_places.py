@@ -6,10 +6,10 @@ import sys
 
 import pandas as pd
 import pytest
+from truth import true_record
 
 from conespot.campaigns import streams
 from conespot.campaigns.command import main
-from conespot.campaigns.row import Finding, Record
 from conespot.campaigns.session import run_campaign
 from conespot.results import writing
 
@@ -27,11 +27,7 @@ class AtOnce:
 
     def execute(self, plan, units, *, frames, note):
         for unit in units:
-            group = plan.groups[unit.group]
-            pose = group.pose(unit.pose)
-            true = {"apex": tuple(map(float, pose.apex)), "axis": tuple(map(float, pose.axis))}
-            findings = [Finding(case=c.key, localizer=n, **true) for c in group.cases for n in c.localizers]
-            yield Record(unit=unit.key, findings=tuple(findings))
+            yield true_record(plan, unit)
 
 
 @pytest.fixture

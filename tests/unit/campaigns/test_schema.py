@@ -21,16 +21,6 @@ sweep:
 """
 
 
-@pytest.fixture
-def campaign(tmp_path):
-    def write(text, name="c.yaml"):
-        path = tmp_path / name
-        path.write_text(text)
-        return read_campaign(str(path))
-
-    return write
-
-
 def cases(document):
     return [combination.campaign for combination in combinations(document)]
 

@@ -2,9 +2,10 @@
 
 import pandas as pd
 import pytest
+from truth import true_record
 
 from conespot.campaigns.ending import RunError
-from conespot.campaigns.row import Finding, Record
+from conespot.campaigns.row import Record
 from conespot.campaigns.session import renew_rows, run_campaign
 from conespot.results import writing
 from conespot.results.run import load_run
@@ -28,11 +29,7 @@ class AtOnce:
             if unit.pose in self.loses:
                 yield Record(unit=unit.key, error="lost in thought")
                 continue
-            group = plan.groups[unit.group]
-            pose = group.pose(unit.pose)
-            true = {"apex": tuple(map(float, pose.apex)), "axis": tuple(map(float, pose.axis))}
-            findings = [Finding(case=c.key, localizer=n, **true) for c in group.cases for n in c.localizers]
-            yield Record(unit=unit.key, findings=tuple(findings))
+            yield true_record(plan, unit)
 
 
 @pytest.fixture

@@ -3,10 +3,11 @@
 import itertools
 
 import pytest
+from truth import true_record
 
 from conespot.campaigns.merge import merge
 from conespot.campaigns.plan import make_plan
-from conespot.campaigns.row import Finding, Record
+from conespot.campaigns.row import Record
 from conespot.campaigns.schema import read_campaign
 from conespot.campaigns.session import carry_out
 from conespot.campaigns.shard import Shard
@@ -34,12 +35,7 @@ class AtOnce:
                 continue
             if frames is not None:
                 (frames / f"{group.cases[0].frame}-{unit.pose:05d}.exr").write_bytes(unit.key.encode())
-            pose = group.pose(unit.pose)
-            true = {"apex": tuple((pose.apex + self.off).tolist()), "axis": tuple(pose.axis.tolist())}
-            yield Record(
-                unit=unit.key,
-                findings=tuple(Finding(case=c.key, localizer=n, **true) for c in group.cases for n in c.localizers),
-            )
+            yield true_record(plan, unit, off=self.off)
 
 
 @pytest.fixture

@@ -4,11 +4,12 @@ import json
 
 import pandas as pd
 import pytest
+from truth import true_record
 
 from conespot.campaigns.command import main
 from conespot.campaigns.ending import RunError
 from conespot.campaigns.log import Log
-from conespot.campaigns.row import Finding, Record
+from conespot.campaigns.row import Record
 from conespot.campaigns.schema import read_campaign
 from conespot.campaigns.session import carry_out, report, run_campaign
 from conespot.campaigns.steering import retry, status
@@ -32,12 +33,14 @@ class AtOnce:
             if unit.pose in self.loses:
                 yield Record(unit=unit.key, by=self.by, error=f"lost pose {unit.pose}")
                 continue
-            group = plan.groups[unit.group]
-            pose = group.pose(unit.pose)
-            true = {"apex": tuple(map(float, pose.apex)), "axis": tuple(map(float, pose.axis))}
-            answer = true if unit.pose else {"reason": "no spotlight found"}
-            findings = [Finding(case=c.key, localizer=n, **answer) for c in group.cases for n in c.localizers]
-            yield Record(unit=unit.key, by=self.by, findings=tuple(findings))
+            record = true_record(plan, unit, by=self.by)
+            if unit.pose == 0:
+                nothing = [
+                    f.model_copy(update={"apex": None, "axis": None, "reason": "no spotlight found"})
+                    for f in record.findings
+                ]
+                record = record.model_copy(update={"findings": tuple(nothing)})
+            yield record
 
 
 @pytest.fixture

@@ -10,11 +10,11 @@ import subprocess
 import time
 
 import pytest
+from truth import true_record
 
 from conespot.campaigns.ending import RunError
 from conespot.campaigns.journal import Journal
 from conespot.campaigns.plan import make_plan
-from conespot.campaigns.row import Finding, Record
 from conespot.campaigns.schema import read_campaign
 from conespot.campaigns.session import carry_out
 from conespot.scene import InputError
@@ -37,10 +37,7 @@ class AtOnce:
                 if number == self.most:
                     time.sleep(3600.0)
                 asked.write(f"{unit.key}\n".encode())
-                pose = plan.groups[unit.group].pose(unit.pose)
-                true = {"apex": tuple(map(float, pose.apex)), "axis": tuple(map(float, pose.axis))}
-                case = plan.groups[unit.group].cases[0].key
-                yield Record(unit=unit.key, findings=(Finding(case=case, localizer="paper", **true),))
+                yield true_record(plan, unit)
 
 
 @pytest.fixture(autouse=True)

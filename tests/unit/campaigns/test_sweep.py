@@ -3,7 +3,7 @@
 import pytest
 
 from conespot.campaigns.plan import make_plan
-from conespot.campaigns.schema import combinations, override, read_campaign, resolved
+from conespot.campaigns.schema import combinations, override, resolved
 from conespot.scene import InputError
 from conespot.scene.document import dump
 
@@ -20,16 +20,6 @@ sweep:
     in the text: {scene: paper, scene.camera.resolution: 400}
   trajectory: [box, helix]
 """
-
-
-@pytest.fixture
-def campaign(tmp_path):
-    def write(text, name="c.yaml"):
-        path = tmp_path / name
-        path.write_text(text)
-        return read_campaign(str(path))
-
-    return write
 
 
 def cases(document):
