@@ -9,7 +9,6 @@ counted. The campaign has two workers and no cache, and its time is all of it, f
 from __future__ import annotations
 
 import argparse
-import json
 import os
 import subprocess
 import sys
@@ -17,13 +16,12 @@ import tempfile
 import time
 from pathlib import Path
 
-import numpy as np
-
 from conespot.campaigns.plan import Group, make_plan
 from conespot.campaigns.schema import override, read_campaign
-from conespot.scene.beam import CyclesBeam
 
-SCRIPT = Path(__file__).parents[1] / "tests" / "system" / "blender_scene.py"
+sys.path.insert(0, str(Path(__file__).parent.parent / "tests" / "cast"))
+
+from cycles_frame import cycles_frame
 
 
 def main() -> None:
@@ -37,7 +35,7 @@ def main() -> None:
     plan = make_plan(document)
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
-        frame = cycles(plan.groups[0], options.python, folder)
+        frame = seconds_of(plan.groups[0], options.python, folder)
         print(f"Cycles: {frame:.1f} s a frame of {options.resolution} px", flush=True)
         command = [sys.executable, "-m", "conespot.campaigns.command", "run", options.campaign]
         command += ["--resolution", options.resolution, "--workers", "2", "--out", str(folder / "run")]
@@ -48,37 +46,17 @@ def main() -> None:
     print(f"{plan.frames} x {frame:.1f} s / {wall:.1f} s = {plan.frames * frame / wall:.0f}")
 
 
-def cycles(group: Group, python: str, folder: Path) -> float:
+def seconds_of(group: Group, python: str, folder: Path) -> float:
     """Seconds of one frame: of the whole one, less those of a single pixel of it."""
-    scene, pose = group.scene, group.pose(0)
-    setting = {
-        "radius": scene.eye.radius,
-        "albedo": 0.1,
-        "power_w": 1.0,
-        "half_angle": scene.beam.half_angle,
-        "blend": scene.beam.blend if isinstance(scene.beam, CyclesBeam) else 0.0,
-        "apex": pose.apex.tolist(),
-        "axis": pose.axis.tolist(),
-        "sensor_width": scene.camera.sensor_width,
-        "focal_length": scene.camera.focal_length,
-        "height": scene.camera.height,
-        "resolution": scene.camera.resolution,
-        "samples": group.samples,
-    }
     taken = []
-    for side in (1.0, 1.0 / scene.camera.resolution):
-        (folder / "scene.json").write_text(json.dumps({**setting, "window": [0.0, 0.0, side, side]}))
+    for side in (1.0, 1.0 / group.scene.camera.shape[0]):
         start = time.perf_counter()
-        done = subprocess.run(
-            [python, str(SCRIPT), str(folder / "scene.json"), str(folder / "cycles.npy")],
-            capture_output=True,
-            text=True,
-            check=False,
+        window = (0.0, 0.0, side, side)
+        image = cycles_frame(
+            python, group.scene, group.pose(0), folder, albedo=0.1, samples=group.samples, window=window
         )
         taken.append(time.perf_counter() - start)
-        if done.returncode:
-            raise SystemExit(f"Blender failed: {done.stdout[-1000:]}{done.stderr[-1000:]}")
-        assert np.load(folder / "cycles.npy").size
+        assert image.size
     return taken[0] - taken[1]
 
 

@@ -6,14 +6,13 @@ It needs bpy: the extra `blender` in this Python 3.11, or CONESPOT_BLENDER_PYTHO
 from __future__ import annotations
 
 import importlib.util
-import json
 import os
-import subprocess
 import sys
 from pathlib import Path
 
 import numpy as np
 import pytest
+from cycles_frame import cycles_frame
 from scipy.ndimage import map_coordinates
 
 from conespot.render import Renderer
@@ -22,8 +21,6 @@ from conespot.scene.beam import CyclesBeam, HardBeam
 from conespot.scene.lens import Lens
 from conespot.scene.retina import UniformRetina
 from conespot.scene.spotlights import Instrument
-
-SCRIPT = Path(__file__).with_name("blender_scene.py")
 
 
 def blender_python() -> str | None:
@@ -47,31 +44,13 @@ def rendered(scene: Scene, pose: Pose, folder: Path, samples: int) -> tuple[np.n
     """The radiance of a square frame by Cycles and by us, at 1 W."""
     renderer = Renderer(scene, samples=samples)
     crop, side = renderer.footprint(pose, 0), scene.camera.shape[0]
-    beam, lens = scene.beam, scene.camera.lens
-    assert isinstance(beam, HardBeam | CyclesBeam)
     assert isinstance(scene.retina, UniformRetina)
-    setting = {
-        "window": [v / side for v in (crop.column, crop.row, crop.column + crop.width, crop.row + crop.height)],
-        "radius": scene.eye.radius,
-        "albedo": scene.retina.albedo,
-        "power_w": 1.0,
-        "half_angle": beam.half_angle,
-        "blend": 0.0 if isinstance(beam, HardBeam) else beam.blend,
-        "apex": pose.apex.tolist(),
-        "axis": pose.axis.tolist(),
-        "sensor_width": scene.camera.sensor_width,
-        "focal_length": scene.camera.focal_length,
-        "height": scene.camera.height,
-        "aperture": scene.camera.pupil,
-        "focus": 0.0 if lens is None else lens.focus,
-        "resolution": side,
-        "samples": samples,
-    }
-    (folder / "scene.json").write_text(json.dumps(setting))
-    command = [str(blender_python()), str(SCRIPT), str(folder / "scene.json"), str(folder / "cycles.npy")]
-    done = subprocess.run(command, capture_output=True, text=True, timeout=600, check=False)
-    assert done.returncode == 0, done.stdout[-2000:] + done.stderr[-2000:]
-    theirs = 1e6 * np.load(folder / "cycles.npy").astype(float)  # Blender's unit of length is taken as 1 mm
+    left, top, right, bottom = (
+        v / side for v in (crop.column, crop.row, crop.column + crop.width, crop.row + crop.height)
+    )
+    python, albedo, window = str(blender_python()), scene.retina.albedo, (left, top, right, bottom)
+    seen = cycles_frame(python, scene, pose, folder, albedo=albedo, samples=samples, window=window)
+    theirs = 1e6 * seen.astype(float)  # Blender's unit of length is taken as 1 mm
     ours = np.zeros((side, side))
     tile = renderer.tile(pose, 0, seed=1)
     ours[tile.crop.slices] = tile.radiance[..., 0]
