@@ -6,6 +6,7 @@ import socket
 import subprocess
 import sys
 import time
+from pathlib import Path
 
 import pytest
 
@@ -109,7 +110,9 @@ class Scheduling:
     def start(self, *command):
         program = [sys.executable, "-m", f"distributed.cli.{command[0]}", *command[1:]]
         quiet = {"stdout": subprocess.DEVNULL, "stderr": subprocess.DEVNULL}
-        self.processes.append(subprocess.Popen(program, cwd=self.folder, **quiet))
+        # the fake bench reaches a worker by its module's name
+        env = os.environ | {"PYTHONPATH": str(Path(__file__).parents[2])}
+        self.processes.append(subprocess.Popen(program, cwd=self.folder, env=env, **quiet))
         return self.processes[-1]
 
     def scheduler(self):
