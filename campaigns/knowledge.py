@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import numpy as np
 from pydantic import BeforeValidator, Field, PlainSerializer, model_validator
 
-from conespot.localize.model.prior import RCM_SIGMA_MM, Knowns
+from conespot.localize.model.knowns import RCM_SIGMA_MM, Knowns
 from conespot.scene import Scene
 from conespot.scene.model import Model
 from conespot.scene.quantity import Angle, Length, format_quantity

@@ -11,8 +11,8 @@ if TYPE_CHECKING:
     from conespot.localize.calibration import calibrate
     from conespot.localize.image import Reference
     from conespot.localize.locate import locate
+    from conespot.localize.model.knowns import Knowns
     from conespot.localize.model.noise import SensorNoise
-    from conespot.localize.model.prior import Knowns
     from conespot.localize.outcome import Localization, LocalizationFailure
     from conespot.localize.sequence import locate_sequence
     from conespot.render.exposure import Exposure

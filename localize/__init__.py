@@ -3,8 +3,8 @@
 from conespot.localize.image import Reference
 from conespot.localize.localizer import Localizer
 from conespot.localize.locate import LOCALIZERS, find_localizer, localizer_names, locate
+from conespot.localize.model.knowns import Knowns
 from conespot.localize.model.noise import SensorNoise
-from conespot.localize.model.prior import Knowns
 from conespot.localize.outcome import Localization, LocalizationFailure
 
 __all__ = [

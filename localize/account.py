@@ -8,7 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from conespot.localize.image import AnyImage, Frame
-from conespot.localize.model.prior import Estimate, Knowns
+from conespot.localize.model.estimate import Estimate
+from conespot.localize.model.knowns import Knowns
 from conespot.localize.model.view import Bins, Shown, Window, outline
 from conespot.localize.outcome import LocalizationFailure, Outcome
 from conespot.localize.published.methods import METHODS

@@ -18,8 +18,9 @@ from numpy.typing import NDArray
 from conespot.localize.edge.fit import fit_edge
 from conespot.localize.edge.sandwich import EdgeFit
 from conespot.localize.image import AnyImage, Frame
+from conespot.localize.model.estimate import Estimate
+from conespot.localize.model.knowns import Knowns
 from conespot.localize.model.noise import NoiseModel
-from conespot.localize.model.prior import FREE, Estimate, Knowns, value, with_value
 from conespot.localize.model.solve import inverse
 from conespot.localize.outcome import LocalizationFailure
 from conespot.localize.start.search import find_start
@@ -28,8 +29,6 @@ from conespot.scene.pose import tangents
 from conespot.scene.scene import Scene
 
 Array = NDArray[np.float64]
-NAMES = (*FREE, "rcm_x", "rcm_y", "rcm_z")
-_UNITS = {"half_angle": (180.0 / np.pi, " deg"), "softness": (1.0, "")}
 #: sigma of what a scene does not have
 _FIXED = 1e-9
 
@@ -64,6 +63,10 @@ class CalibrationSettings:
 
 
 CALIBRATION = CalibrationSettings()
+QUANTITIES = CALIBRATION.tight.free
+NAMES = (*(quantity.name for quantity in QUANTITIES), "rcm_x", "rcm_y", "rcm_z")
+#: unit and how many of it are one of that held inside; the RCM's is mm
+_UNITS = {quantity.name: (quantity.unit, 1.0 / quantity.per_unit) for quantity in QUANTITIES}
 
 
 @dataclass(frozen=True)
@@ -104,8 +107,8 @@ class Calibration:
         for name, number, sigma in zip(NAMES, self.values, self.sigmas, strict=True):
             if sigma <= _FIXED:
                 continue
-            factor, unit = _UNITS.get(name, (1.0, " mm"))
-            said = f"{number * factor:.4f} +- {sigma * factor:.4f}{unit}"
+            unit, factor = _UNITS.get(name, ("mm", 1.0))
+            said = f"{number * factor:.4f} +- {sigma * factor:.4f} {unit}".rstrip()
             seen = self.observable[name]
             lines.append(f"{name}: {said}" if seen else f"{name}: not observable from this sequence ({said})")
         return "\n".join(lines)
@@ -167,16 +170,16 @@ def _has_softness(scene: Scene) -> bool:
 
 
 def _values(scene: Scene) -> Array:
-    own = [value(scene, name) if name != "softness" or _has_softness(scene) else 0.0 for name in FREE]
+    own = [quantity.read(scene) or 0.0 for quantity in QUANTITIES]
     return np.array([*own, *scene.instrument.rcm])
 
 
 def _with_values(scene: Scene, values: Array, taken: Sequence[bool]) -> Scene:
     """The scene with those of the values `[7]` that are `taken`."""
-    for name, new, take in zip(FREE, values, taken, strict=False):
-        if take and (name != "softness" or _has_softness(scene)):
-            scene = with_value(scene, name, float(new))
-    own = len(FREE)
+    for quantity, new, take in zip(QUANTITIES, values, taken, strict=False):
+        if take and quantity.read(scene) is not None:
+            scene = quantity.write(scene, float(new))
+    own = len(QUANTITIES)
     rcm = tuple(
         float(new) if take else old
         for old, new, take in zip(scene.instrument.rcm, values[own:], taken[own:], strict=True)
@@ -219,9 +222,9 @@ def _term(fit: EdgeFit, scene: Scene, tight: Knowns, width: Width) -> tuple[Arra
     """A frame's information on the common quantities and its pull on them, its pose eliminated."""
     estimate = fit.estimate
     size, free = estimate.pose_size, tight.free
-    kept = [FREE.index(name) for name in free]
+    kept = [QUANTITIES.index(quantity) for quantity in free]
     here, nominal = _values(estimate.scene)[kept], _values(scene)[kept]
-    own_prior = 1.0 / np.square([tight.sigma(name) or np.inf for name in free])
+    own_prior = 1.0 / np.square([tight.sigma(quantity) or np.inf for quantity in free])
     u, v = tangents(estimate.pose.axis)
     offset = np.asarray(scene.instrument.rcm) - estimate.pose.apex
     along = float(offset @ estimate.pose.axis)
@@ -250,7 +253,7 @@ def _term(fit: EdgeFit, scene: Scene, tight: Knowns, width: Width) -> tuple[Arra
     pose, common = information[:size, :size], information[size:, :size]
     solved = np.linalg.solve(pose, np.column_stack([common.T, pull[:size]]))
     # a quantity that is not free here has no information
-    at = np.array([*kept, *range(len(FREE), len(NAMES))])
+    at = np.array([*kept, *range(len(QUANTITIES), len(NAMES))])
     told, pulls = np.zeros((len(NAMES), len(NAMES))), np.zeros(len(NAMES))
     told[np.ix_(at, at)] = information[size:, size:] - common @ solved[:, :-1]
     pulls[at] = pull[size:] - common @ solved[:, -1]

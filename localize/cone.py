@@ -8,8 +8,9 @@ from __future__ import annotations
 
 from conespot.localize.edge.fit import fit_edge
 from conespot.localize.image import AnyImage, Frame, Reference
+from conespot.localize.model.estimate import Estimate
+from conespot.localize.model.knowns import Knowns
 from conespot.localize.model.noise import NoiseModel
-from conespot.localize.model.prior import Estimate, Knowns
 from conespot.localize.outcome import LocalizationFailure, Outcome
 from conespot.localize.start.search import believed, find_starts
 from conespot.localize.verdict import judged

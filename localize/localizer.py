@@ -6,8 +6,8 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 from conespot.localize.image import AnyImage, Reference
+from conespot.localize.model.knowns import Knowns
 from conespot.localize.model.noise import NoiseModel
-from conespot.localize.model.prior import Knowns
 from conespot.localize.outcome import Outcome
 from conespot.scene import Pose, Scene
 

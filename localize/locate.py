@@ -9,8 +9,8 @@ from numpy.typing import ArrayLike
 
 from conespot.localize.image import AnyImage, Reference, checked
 from conespot.localize.localizer import Beside, Localizer
+from conespot.localize.model.knowns import Knowns
 from conespot.localize.model.noise import NoiseModel
-from conespot.localize.model.prior import Knowns
 from conespot.localize.outcome import Outcome
 from conespot.localize.plugin import load_plugin, plugins
 from conespot.localize.published.methods import paper, paper_code, paper_code_float, paper_code_oracle

@@ -11,8 +11,9 @@ from conespot.localize.cone import edge_outcome
 from conespot.localize.edge.fit import is_clipped, is_sharp
 from conespot.localize.field.fit import fit_patch
 from conespot.localize.image import AnyImage, Frame, Reference
+from conespot.localize.model.estimate import Estimate
+from conespot.localize.model.knowns import Knowns
 from conespot.localize.model.noise import NoiseModel
-from conespot.localize.model.prior import Estimate, Knowns
 from conespot.localize.model.solve import inverse
 from conespot.localize.outcome import LocalizationFailure, Outcome
 from conespot.localize.start.search import Start, believed, find_starts

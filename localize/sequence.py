@@ -13,8 +13,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from conespot.localize.image import AnyImage, Frame, Reference, white_level
+from conespot.localize.model.estimate import Estimate
+from conespot.localize.model.knowns import Knowns
 from conespot.localize.model.noise import NoiseModel
-from conespot.localize.model.prior import Estimate, Knowns
 from conespot.localize.model.view import outlines
 from conespot.localize.outcome import LocalizationFailure, Outcome
 from conespot.localize.photometric import photometric

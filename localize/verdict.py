@@ -8,7 +8,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from conespot.localize.model.prior import Estimate, Knowns, rcm_miss
+from conespot.localize.model.estimate import Estimate
+from conespot.localize.model.knowns import Knowns
+from conespot.localize.model.prior import rcm_miss
 from conespot.localize.outcome import COVERED, UNCERTAIN, Localization, LocalizationFailure, Outcome
 from conespot.scene.scene import Scene
 

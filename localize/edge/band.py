@@ -19,9 +19,11 @@ from conespot.localize.edge.sandwich import EdgeFit
 from conespot.localize.edge.settings import EDGE, Level
 from conespot.localize.edge.strips import Eliminated, score_covariance
 from conespot.localize.image import Frame, Reference
+from conespot.localize.model.estimate import Estimate
 from conespot.localize.model.forward import ambient_irradiance, look
+from conespot.localize.model.knowns import Knowns
 from conespot.localize.model.noise import NoiseModel
-from conespot.localize.model.prior import Estimate, Knowns, prior_rows
+from conespot.localize.model.prior import prior_rows
 from conespot.localize.model.solve import limited, reduction, solved
 from conespot.localize.model.view import spotlight_irradiance
 from conespot.localize.outcome import COVERED, UNCERTAIN, LocalizationFailure

@@ -9,8 +9,9 @@ from conespot.localize.edge.sandwich import EdgeFit
 from conespot.localize.edge.saturated import SaturatedFit, fit_saturated
 from conespot.localize.edge.settings import EDGE, Level
 from conespot.localize.image import Frame, Reference
+from conespot.localize.model.estimate import Estimate
+from conespot.localize.model.knowns import Knowns
 from conespot.localize.model.noise import NoiseModel
-from conespot.localize.model.prior import Estimate, Knowns
 from conespot.localize.model.profile import Profile
 from conespot.localize.model.view import outlines
 from conespot.localize.outcome import COVERED, UNCERTAIN, LocalizationFailure

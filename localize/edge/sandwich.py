@@ -9,7 +9,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from conespot.localize.model.prior import Estimate
+from conespot.localize.model.estimate import Estimate
 from conespot.localize.model.solve import STEP, inverse
 
 Array = NDArray[np.float64]

@@ -17,8 +17,9 @@ from conespot.localize.edge.sandwich import EdgeFit
 from conespot.localize.edge.settings import EDGE
 from conespot.localize.edge.strips import WIDTH, Strips, score_covariance
 from conespot.localize.image import Frame
+from conespot.localize.model.estimate import Estimate
+from conespot.localize.model.knowns import Knowns
 from conespot.localize.model.outline import distances, outline_problem
-from conespot.localize.model.prior import Estimate, Knowns
 from conespot.localize.model.residual import follows, spread, student_weights
 from conespot.localize.model.solve import limited, reduction, solved
 from conespot.localize.model.view import Shown

@@ -15,8 +15,10 @@ from conespot.localize.field.albedo import Modes
 from conespot.localize.field.piece import Piece
 from conespot.localize.field.settings import FIELD, Level
 from conespot.localize.image import Frame, Reference
+from conespot.localize.model.estimate import Estimate
+from conespot.localize.model.knowns import Knowns
 from conespot.localize.model.noise import NoiseModel
-from conespot.localize.model.prior import Estimate, Knowns, prior_rows
+from conespot.localize.model.prior import prior_rows
 from conespot.localize.model.solve import STEP, inverse, limited
 from conespot.localize.model.view import Bins, Shown, Window, log_albedo, visible
 from conespot.localize.outcome import COVERED, UNCERTAIN, LocalizationFailure

@@ -5,15 +5,18 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from conespot.localize.model.estimate import Estimate
 from conespot.localize.model.forward import look, rotation_basis
-from conespot.localize.model.prior import BEAM, Estimate, Knowns, prior_rows, value, with_value
+from conespot.localize.model.knowns import Knowns
+from conespot.localize.model.prior import prior_rows
 from conespot.localize.model.solve import Problem, Solution, minimize
 from conespot.scene.pose import Pose
 from conespot.scene.scene import Scene
 from conespot.scene.spotlights import spotlight_axes
 
 Array = NDArray[np.float64]
-_STEP = {"eye_radius": 1e-4, "camera_height": 1e-4}
+#: an outline is smoother than light: differences of it may be this much finer
+_FINER = 0.1
 
 
 def distances(pixels: Array, spots: NDArray[np.intp], estimate: Estimate) -> tuple[Array, Array, Array]:
@@ -52,14 +55,13 @@ def outline_problem(
     def problem(estimate: Estimate) -> tuple[Array, Array, Array, Array]:
         r, jac, by_angle = distances(pixels, spots, estimate)
         columns = [jac]
-        for name in knowns.free:
-            if name in BEAM:
-                # the outline is where the beam ends, however softly
-                columns.append(by_angle[:, None] if name == "half_angle" else np.zeros((len(pixels), 1)))
+        for quantity in knowns.free:
+            if quantity.changes == "beam":
+                columns.append(by_angle[:, None] * quantity.widens)
                 continue
-            here, step = value(estimate.scene, name), _STEP[name]
+            step = _FINER * quantity.step
             sides = [
-                distances(pixels, spots, Estimate(estimate.pose, with_value(estimate.scene, name, here + s)))[0]
+                distances(pixels, spots, Estimate(estimate.pose, estimate.beside(quantity, s)))[0]
                 for s in (step, -step)
             ]
             columns.append(((sides[0] - sides[1]) / (2.0 * step))[:, None])

@@ -8,7 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from conespot.localize.model.prior import Estimate
+from conespot.localize.model.estimate import Estimate
+from conespot.localize.model.quantity import Quantity
 from conespot.localize.model.residual import student_cost, student_weights
 
 Array = NDArray[np.float64]
@@ -77,7 +78,7 @@ Problem = Callable[[Estimate], tuple[Array, Array, Array, Array]]
 def minimize(
     problem: Problem,
     start: Estimate,
-    free: tuple[str, ...],
+    free: tuple[Quantity, ...],
     *,
     robust: bool = True,
     iterations: int = 30,

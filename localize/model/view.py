@@ -9,15 +9,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from conespot.localize.image import Frame, Reference
+from conespot.localize.model.estimate import Estimate
 from conespot.localize.model.forward import Sight, ambient_irradiance, light, light_by_surface, look, window
+from conespot.localize.model.knowns import Knowns
 from conespot.localize.model.noise import NoiseModel
 from conespot.localize.model.occlusion import covered
-from conespot.localize.model.prior import BEAM, Estimate, Knowns, value, with_value
 from conespot.scene.scene import Scene
 from conespot.scene.spotlights import spotlight_axes
 
 Array = NDArray[np.float64]
-_STEP = 1e-3  # of eye radius and camera height [mm], for differences
 _POINTS = 96  # of an outline
 
 
@@ -207,18 +207,15 @@ def spotlight_irradiance(
     `sight` is what the bins of `side` px at `pixels` `[N, 2]` see of the nominal surface.
     """
     free = knowns.free
-    scene_moves = bool({"eye_radius", "camera_height"} & set(free))
-    seen = look(estimate.scene, pixels, side) if scene_moves else sight
+    moving = [each for each in free if each.changes == "sight"]
+    seen = look(estimate.scene, pixels, side) if moving else sight
     changes = estimate.beam_changes(free)
     here = light(seen, estimate.pose, estimate.scene, estimate.profile, pose_size=estimate.pose_size, changes=changes)
     rows = [here.jacobian]
-    for name in (name for name in free if name not in BEAM):
-        plus, minus = (
-            look(with_value(estimate.scene, name, value(estimate.scene, name) + step), pixels, side)
-            for step in (_STEP, -_STEP)
-        )
-        rows.append(light_by_surface(here, seen, estimate.pose, (plus, minus), _STEP)[None])
+    for each in moving:
+        plus, minus = (look(estimate.beside(each, step), pixels, side) for step in (each.step, -each.step))
+        rows.append(light_by_surface(here, seen, estimate.pose, (plus, minus), each.step)[None])
     jacobian = np.concatenate(rows)
-    if scene_moves:  # and the iris before some of the bins
+    if moving:  # and the iris before some of the bins
         return np.nan_to_num(here.value), np.nan_to_num(jacobian)
     return here.value, jacobian

@@ -16,9 +16,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from conespot.localize.image import Frame, Reference
+from conespot.localize.model.estimate import Estimate
 from conespot.localize.model.forward import moved
 from conespot.localize.model.outline import distances
-from conespot.localize.model.prior import Estimate
 from conespot.localize.model.residual import spread
 from conespot.localize.outcome import Localization, LocalizationFailure, Outcome
 from conespot.localize.start.rays import rays_across, support

@@ -11,7 +11,9 @@ from typing import Any, assert_never
 
 import numpy as np
 
-from conespot.localize.model.prior import Estimate, Knowns, prior_rows
+from conespot.localize.model.estimate import Estimate
+from conespot.localize.model.knowns import Knowns
+from conespot.localize.model.prior import prior_rows
 from conespot.localize.theory.bounds import Bound, Electrons, cramer_rao, error_budget, smoothed_over
 from conespot.localize.theory.conic import table_1
 from conespot.localize.theory.design import beam_of, compare_designs

@@ -13,10 +13,13 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from conespot.localize.model.estimate import Estimate
 from conespot.localize.model.forward import Light, light, look, window
+from conespot.localize.model.knowns import Knowns
 from conespot.localize.model.outline import distances
-from conespot.localize.model.prior import BEAM, Estimate, Knowns, prior_rows, value, with_value
+from conespot.localize.model.prior import prior_rows
 from conespot.localize.model.profile import Profile
+from conespot.localize.model.quantity import Quantity, quantity
 from conespot.localize.model.solve import inverse
 from conespot.localize.theory.settings import THEORY
 from conespot.scene.pose import Pose
@@ -87,7 +90,7 @@ def cramer_rao(
     gain = sensor.peak / peak
     rows = [gain * here.jacobian[:size]]
     rows.append(gain * here.jacobian[size:])
-    rows += [gain * _difference(scene, pose, pixels, name)[None] for name in knowns.free if name not in BEAM]
+    rows += [gain * _difference(estimate, pixels, each)[None] for each in knowns.free if each.changes == "sight"]
     nuisance = np.stack([gain * here.value, np.ones(here.value.size)])
     jacobian = np.concatenate([*rows, nuisance])
     information = (jacobian / (gain * here.value + sensor.background**2)) @ jacobian.T
@@ -116,9 +119,9 @@ def _light(
     return light(sight, pose, scene, Profile.of(scene.beam), pose_size=pose_size, changes=changes)
 
 
-def _difference(scene: Scene, pose: Pose, pixels: Array, name: str) -> Array:
+def _difference(estimate: Estimate, pixels: Array, quantity: Quantity) -> Array:
     step = THEORY.difference
-    sides = [_light(with_value(scene, name, value(scene, name) + s), pose, pixels).value for s in (step, -step)]
+    sides = [_light(estimate.beside(quantity, s), estimate.pose, pixels).value for s in (step, -step)]
     return (sides[0] - sides[1]) / (2.0 * step)
 
 
@@ -178,7 +181,7 @@ def _believed(scene: Scene, pose: Pose, name: str, error: float, *, rcm: bool) -
         moved = tuple(float(c) for c in np.asarray(scene.instrument.rcm) + error * shift)
         believed = scene.model_copy(update={"instrument": scene.instrument.model_copy(update={"rcm": moved})})
     else:
-        believed = with_value(scene, name, value(scene, name) + error)
+        believed = Estimate(pose, scene).beside(quantity(name), error)
     return _step(pixels, spots, Estimate(pose, believed), rcm=rcm)
 
 

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from conespot.localize.model.prior import Knowns
+from conespot.localize.model.knowns import Knowns
 from conespot.localize.theory.bounds import Electrons, cramer_rao
 from conespot.scene.beam import Beam, CyclesBeam, HardBeam
 from conespot.scene.scene import Scene

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from conespot.localize import locate
+from conespot.localize.model.knowns import Knowns
 from conespot.localize.model.occlusion import covered
-from conespot.localize.model.prior import Knowns
 from conespot.localize.theory.bounds import patch_pixels
 from conespot.render import Exposure, Renderer
 from conespot.scene import Camera, Scene

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from conespot.localize import locate
-from conespot.localize.model.prior import Knowns
+from conespot.localize.model.knowns import Knowns
 from conespot.render import Exposure, Renderer, kernel
 from conespot.render.retina_mesh import retina_mesh
 from conespot.scene import Camera, Scene

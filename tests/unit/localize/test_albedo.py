@@ -9,7 +9,7 @@ from conespot.localize import Knowns
 from conespot.localize.field.albedo import Modes, even
 from conespot.localize.field.roughness import Roughness
 from conespot.localize.field.settings import FIELD
-from conespot.localize.model.prior import Estimate
+from conespot.localize.model.estimate import Estimate
 from conespot.localize.model.view import Bins, Window
 from conespot.scene.camera import Camera
 from conespot.scene.scene import Scene

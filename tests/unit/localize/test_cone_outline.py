@@ -7,8 +7,8 @@ import pytest
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
+from conespot.localize.model.knowns import Knowns
 from conespot.localize.model.outline import fit_outline
-from conespot.localize.model.prior import Knowns
 from conespot.scene.beam import HardBeam
 from conespot.scene.camera import Camera
 from conespot.scene.scene import Scene

@@ -10,8 +10,8 @@ from conespot.localize.edge.fit import fit_edge
 from conespot.localize.edge.saturated import SaturatedFit
 from conespot.localize.edge.strips import Strips, score_covariance
 from conespot.localize.image import Frame
+from conespot.localize.model.estimate import Estimate
 from conespot.localize.model.forward import ambient_irradiance, light, look, moved, window
-from conespot.localize.model.prior import Estimate
 from conespot.localize.model.profile import Profile
 from conespot.localize.theory.bounds import cramer_rao
 from conespot.scene import Scene

@@ -5,8 +5,8 @@ import math
 import numpy as np
 import pytest
 
+from conespot.localize.model.knowns import Knowns
 from conespot.localize.model.outline import fit_outline
-from conespot.localize.model.prior import Knowns
 from conespot.localize.theory.assessment import electrons_of, tied
 from conespot.localize.theory.bounds import Electrons, cramer_rao, smoothed_over
 from conespot.scene.camera import Camera

@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from conespot.localize.model.prior import Knowns
+from conespot.localize.model.knowns import Knowns
 from conespot.localize.theory.bounds import cramer_rao, error_budget
 from conespot.scene.beam import CyclesBeam, HardBeam
 from conespot.scene.camera import Camera

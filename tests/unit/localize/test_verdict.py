@@ -5,7 +5,8 @@ import math
 import numpy as np
 import pytest
 
-from conespot.localize.model.prior import Estimate, Knowns
+from conespot.localize.model.estimate import Estimate
+from conespot.localize.model.knowns import Knowns
 from conespot.localize.model.solve import inverse
 from conespot.localize.outcome import COVERED, UNCERTAIN, Localization
 from conespot.localize.verdict import (

@@ -1,0 +1,93 @@
+"""What of a scene may be free beside the pose: how each is read and written, and what of an image changes with it.
+
+A quantity more is an entry of `QUANTITIES` and a field of `Knowns` that says how well it is known.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Literal
+
+from conespot.scene.document import InputError
+from conespot.scene.scene import Scene
+
+#: a softness below is a hard edge to every camera
+_HARDEST = 1e-3
+
+
+@dataclass(frozen=True)
+class Quantity:
+    """A number of the scene that a fit may estimate, in the unit held inside."""
+
+    name: str
+    read: Callable[[Scene], float | None]  #: its value; None where the scene has no such thing
+    write: Callable[[Scene, float], Scene]  #: the scene with another value
+    changes: Literal["beam", "sight"]  #: the beam's profile, or what the pixels see (surface, camera)
+    step: float  #: of central differences of the light
+    known: str  #: the field of `Knowns` that has its sigma
+    per_unit: float = 1.0  #: the unit of that field in the one held inside
+    unit: str = ""  #: of that field, as it is written
+    widens: float = 0.0  #: by how much the outline's angle off the axis grows with it [rad]
+    remedy: str = ""  #: what a scene without it should say
+
+    def value(self, scene: Scene) -> float:
+        """Its value in a scene. Raises InputError where the scene has no such thing."""
+        found = self.read(scene)
+        if found is None:
+            raise InputError(f"knowns: this scene has no {self.name}; {self.remedy}")
+        return found
+
+
+def _with_softness(scene: Scene, new: float) -> Scene:
+    # a fit may look a little beyond the softest beam there is
+    return scene.model_copy(update={"beam": scene.beam.model_copy(update={"blend": max(new, _HARDEST)})})
+
+
+#: in the order in which they join the parameters of a fit
+QUANTITIES = (
+    Quantity(
+        name="half_angle",
+        read=lambda scene: scene.beam.half_angle,
+        write=lambda scene, new: scene.model_copy(update={"beam": scene.beam.stretched(new)}),
+        changes="beam",
+        step=1e-6,
+        known="half_angle_sigma_deg",
+        per_unit=math.radians(1.0),
+        unit="deg",
+        widens=1.0,
+    ),
+    Quantity(
+        name="softness",
+        read=lambda scene: scene.beam.softness,
+        write=_with_softness,
+        changes="beam",
+        step=1e-4,
+        known="softness_sigma",
+        remedy="describe its beam as a cycles beam",
+    ),
+    Quantity(
+        name="eye_radius",
+        read=lambda scene: scene.eye.radius,
+        write=lambda scene, new: scene.model_copy(update={"eye": scene.eye.model_copy(update={"radius": new})}),
+        changes="sight",
+        step=1e-3,
+        known="eye_radius_sigma_mm",
+        unit="mm",
+    ),
+    Quantity(
+        name="camera_height",
+        read=lambda scene: scene.camera.height,
+        write=lambda scene, new: scene.model_copy(update={"camera": scene.camera.model_copy(update={"height": new})}),
+        changes="sight",
+        step=1e-3,
+        known="camera_height_sigma_mm",
+        unit="mm",
+    ),
+)
+
+
+def quantity(name: str) -> Quantity:
+    """The quantity of that name. Raises KeyError if there is none."""
+    return {each.name: each for each in QUANTITIES}[name]
