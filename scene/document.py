@@ -31,8 +31,11 @@ _MAX_NODES = 12_000
 _MAX_DEPTH = 32
 _MAX_BITS = 1024
 _LONGEST = 1000
-#: keys of a camera that its calibration file stands for
-CALIBRATED = ("resolution", "focal_length", "pixel_aspect", "principal_point", "distortion")
+#: keys that another key stands for: a camera's calibration file, and the eye of a population whose shape a surface has
+_STOOD_FOR = {
+    "calibration": ("resolution", "focal_length", "pixel_aspect", "principal_point", "distortion"),
+    "population": ("semi_axes",),
+}
 _PLAIN_TAGS = {f"tag:yaml.org,2002:{name}" for name in ("str", "int", "float", "bool", "null")}
 
 
@@ -216,10 +219,11 @@ def merge(base: dict[str, Any], over: dict[str, Any], model: type[BaseModel] | N
     """`base` with `over` laid on it: mappings are merged key by key, everything else is replaced.
 
     A mapping that names another `kind` replaces as a whole, since its other keys mean nothing to the new kind; one that
-    names a `calibration` file replaces what such a file holds. Where the data are a `model`'s, a word of `base`
-    (`sensor: linear`) is the mapping that it stands for.
+    names a `calibration` file, or an eye of the `population`, replaces what that holds. Where the data are a `model`'s,
+    a word of `base` (`sensor: linear`) is the mapping that it stands for.
     """
-    result = {key: value for key, value in base.items() if "calibration" not in over or key not in CALIBRATED}
+    replaced = [key for name, keys in _STOOD_FOR.items() if name in over for key in keys]
+    result = {key: value for key, value in base.items() if key not in replaced}
     for key, value in over.items():
         old = result.get(key)
         if model is not None and isinstance(old, str) and isinstance(value, dict):

@@ -6,16 +6,17 @@ Whatever it is made of, it is one radius over the unit directions seen from the 
 from __future__ import annotations
 
 import math
-from typing import Annotated
+from typing import Annotated, Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from pydantic import Field
+from pydantic import Field, model_validator
 
 from conespot.scene.bump import Bump
 from conespot.scene.eye import Eye
 from conespot.scene.height_map import HeightMap
 from conespot.scene.model import Model, named
+from conespot.scene.population import semi_axes_of
 from conespot.scene.quantity import format_quantity
 
 Array = NDArray[np.float64]
@@ -29,7 +30,8 @@ class Surface(Model):
     """The wall with `bumps` and a `height_map` that add up; smooth without any.
 
     The wall touches the origin with its posterior pole. It is an ellipsoid with `semi_axes` along x, y and z in units
-    of the eye's radius: (1, 1, 1.1) is a myopic eye, longer than wide.
+    of the eye's radius: (1, 1, 1.1) is a myopic eye, longer than wide. In their place `population` names an eye by its
+    number, or the `mean` one, for an eye.radius of 10.311 mm.
 
     >>> eye, surface = Eye(), Surface(bumps=(Bump(x=0.0, y=0.0, height=0.1),))
     >>> surface.points(eye, [0.0, 0.0, -1.0]).round(9).tolist()
@@ -39,6 +41,18 @@ class Surface(Model):
     semi_axes: tuple[_Ratio, _Ratio, _Ratio] = _SPHERE
     bumps: tuple[Bump, ...] = Field((), max_length=10000)
     height_map: HeightMap | None = None
+
+    @model_validator(mode="before")
+    @classmethod
+    def _of_population(cls, data: Any) -> Any:
+        if not (isinstance(data, dict) and "population" in data):
+            return data
+        eye = data["population"]
+        if "semi_axes" in data:
+            raise ValueError("give either population or semi_axes")
+        if eye != "mean" and not (type(eye) is int and 0 <= eye < 2**32):
+            raise ValueError(f"population: the number of an eye (0, 1, ...) or mean, got {eye!r}")
+        return {key: value for key, value in data.items() if key != "population"} | {"semi_axes": semi_axes_of(eye)}
 
     @property
     def is_sphere(self) -> bool:

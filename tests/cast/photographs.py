@@ -41,8 +41,8 @@ def albedo(texture, points):
 
 
 def cast(scene, x, y):
-    rays = scene.camera.rays(np.stack(np.meshgrid(x, y), axis=-1)).directions
-    return scene.surface.intersect(scene.eye, scene.camera.centre, rays)
+    rays = scene.camera.rays(np.stack(np.meshgrid(x, y), axis=-1))
+    return scene.surface.intersect(scene.eye, rays.origins, rays.directions)
 
 
 def upward(scene, points):
@@ -66,7 +66,7 @@ def photograph(scene, pose, texture=None, seed=0, rays=None, noise=True):
     k = rays or (16 if isinstance(scene.beam, HardBeam) else 4)
     plain = scene.model_copy(update={"surface": Scene().surface})
     wall = cast(plain, np.arange(size[0]) + 0.5, np.arange(size[1]) + 0.5)
-    electrons = AMBIENT * albedo(texture, wall) * upward(scene, wall)
+    electrons = np.nan_to_num(AMBIENT * albedo(texture, wall) * upward(scene, wall))  # black behind an iris
     outlines = [scene.camera.project(scene.outline(pose, i)) for i in range(len(scene.spotlights))]
     every = np.concatenate(outlines)
     low = np.floor(np.nanmin(every, axis=0)).astype(int).clip(2) - 2
@@ -77,7 +77,7 @@ def photograph(scene, pose, texture=None, seed=0, rays=None, noise=True):
         points = cast(scene, x, row + (np.arange(k) + 0.5) / k)
         a = albedo(texture, points)
         both = np.stack([a * upward(scene, points), a * spotlight(scene, pose, points)])
-        patch.append(both.reshape(2, k, -1, k).mean(axis=(1, 3)))
+        patch.append(np.nan_to_num(both).reshape(2, k, -1, k).mean(axis=(1, 3)))
     ambient, light = np.stack(patch, axis=1)
     region = electrons[low[1] : high[1], low[0] : high[0]]
     region[:] = AMBIENT * ambient + PEAK * light / np.quantile(light, 0.998)

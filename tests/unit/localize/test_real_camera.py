@@ -11,6 +11,7 @@ from conespot.localize import Localization, locate
 from conespot.scene import Camera, Scene
 from conespot.scene.beam import CyclesBeam, HardBeam
 from conespot.scene.distortion import Distortion
+from conespot.scene.optics import Optics
 from conespot.scene.sensor import Linear
 
 IDEAL = Camera(resolution=1000)
@@ -50,3 +51,22 @@ def test_an_oblong_aslant_distorting_camera_is_as_good_as_the_ideal_one(localize
 def test_the_published_method_sees_what_such_a_camera_sees_through_the_papers_own_pinhole():
     real, ideal = (missed_um("paper", real=camera) for camera in (True, False))
     assert real < 2.0 * ideal + 20.0
+
+
+def test_the_exact_method_sees_through_lens_and_contact_lens_with_the_lights_own_dispersion():
+    """A hard cone at 850 nm under Navarro's eye and a flat contact lens, aslant; the frame is cast by exact rays."""
+    optics = Optics(lens="phakic", contact="flat")
+    camera = Camera(
+        resolution=(480, 270),
+        sensor_width=24.0,
+        focal_length=750.0,
+        height=200.0,
+        tilt=math.radians(5.0),
+        optics=optics,
+    )
+    scene = Scene(beam=HardBeam(), camera=camera, sensor=Linear(bits=12), illumination="ir850")
+    tip = np.array([0.4, 0.3, 3.0])
+    image = photograph(scene, scene.pose(tip), rays=6)
+    yellow = scene.model_copy(update={"camera": camera.seeing(589.3)})
+    off, wrong = (locate(image, told, "cone", noise=NOISE).apex_mm - tip for told in (scene, yellow))
+    assert np.linalg.norm(off) < 3e-3 < np.linalg.norm(wrong)
