@@ -9,6 +9,8 @@ from pathlib import Path
 from conespot.campaigns import subcommands
 from conespot.campaigns.ending import Ending
 from conespot.campaigns.machines import add_machines
+from conespot.campaigns.new_campaign import QUESTIONS
+from conespot.campaigns.questions import add_questions
 from conespot.campaigns.settings import add_set, add_settings
 
 #: adds the command that a function does, called as it is, with what it says of itself
@@ -39,6 +41,10 @@ def parser() -> argparse.ArgumentParser:
 
 def _add_campaigns(add: _Add) -> None:
     """What begins with a campaign or a scene."""
+    init = add(subcommands.init, "write a commented campaign of your own, from a few answers or options")
+    init.add_argument("file", nargs="?", type=Path, default=Path("my_campaign.yaml"), help="(default: %(default)s)")
+    init.add_argument("--defaults", action="store_true", help="ask nothing, take the default where no option is given")
+    add_questions(init, QUESTIONS, "the answers, asked for on a terminal")
     run = add(subcommands.run, "render, localize and compare; an interrupted run is continued")
     plan = add(subcommands.plan, "say what a run would do")
     validate = add(subcommands.validate, "check a campaign and every combination it sweeps over")

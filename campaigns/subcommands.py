@@ -15,6 +15,16 @@ if TYPE_CHECKING:
     from conespot.campaigns.session import Session
 
 
+def init(options: argparse.Namespace) -> Ending:
+    """Write a campaign from a few answers."""
+    from conespot.campaigns.new_campaign import QUESTIONS, write_campaign
+    from conespot.campaigns.questions import answers
+
+    rows = write_campaign(options.file, answers(options, QUESTIONS))
+    _say(f"{options.file}: {rows} rows; next: campaign plan {options.file}")
+    return Ending.DONE
+
+
 def validate(options: argparse.Namespace) -> Ending:
     """Check a campaign."""
     from conespot.campaigns.plan import make_plan
