@@ -16,10 +16,8 @@ from conespot.render import spectral
 from conespot.scene import InputError, Pose, Scene
 from conespot.scene.atomic import write_atomically
 from conespot.scene.document import dump
+from conespot.scene.exr import read_exr
 from conespot.scene.spectrum import Curve
-
-#: what a frame may claim before it is unpacked: pixels a side, channels, values a byte (ZIP packs 258, no more)
-_MOST_PIXELS, _MOST_CHANNELS, _MOST_SAMPLES = 20_000, 16, 300
 
 
 def frame_header(scene: Scene, pose: Pose, power_w: float, versions: Mapping[str, str]) -> dict[str, str | float]:
@@ -86,28 +84,12 @@ def read_frame(path: Path) -> tuple[NDArray[np.float32], dict[str, object]]:
 
     Raises InputError if the file is no such frame, or claims a size that no camera has.
     """
-    import OpenEXR
-
-    if not path.is_file():
-        raise InputError(f"{path}: cannot be read as a conespot frame: no such file")
     try:
-        with OpenEXR.File(os.fsencode(path), header_only=True) as file:
-            if len(file.parts) != 1:
-                raise ValueError("it holds several images")
-            low, high = (np.asarray(corner, float) for corner in file.header()["dataWindow"])
-            channels = len(file.header()["channels"])
-        width, height = (high - low + 1.0).astype(int)
-        if not (1 <= width <= _MOST_PIXELS and 1 <= height <= _MOST_PIXELS and 1 <= channels <= _MOST_CHANNELS):
-            raise ValueError(f"{width} x {height} px of {channels} channels are no camera's")
-        if width * height * channels > _MOST_SAMPLES * max(1, path.stat().st_size):
-            raise ValueError(f"{path.stat().st_size} bytes cannot hold {width} x {height} px of {channels} channels")
-        with OpenEXR.File(os.fsencode(path), separate_channels=True) as file:
-            header, found = dict(file.header()), file.channels()
-            names = ["Y"] if "Y" in found else [f"C{i}" for i in range(len(found))]
-            radiance = np.stack([found[name].pixels for name in names], axis=-1).astype(np.float32)
-    except (OSError, RuntimeError, ValueError, KeyError, TypeError, MemoryError) as error:
-        reason = " ".join(str(error).split()) or type(error).__name__
-        raise InputError(f"{path}: cannot be read as a conespot frame: {reason}") from None
+        found, header = read_exr(path)
+        names = ["Y"] if "Y" in found else [f"C{i}" for i in range(len(found))]
+        radiance = np.stack([found[name] for name in names], axis=-1).astype(np.float32)
+    except (ValueError, KeyError, TypeError, MemoryError) as error:
+        raise InputError(f"{path}: cannot be read as a conespot frame: {error}") from None
     return radiance, header
 
 

@@ -26,6 +26,7 @@ from conespot.scene.retina import Fundus, PhotoRetina, Retina
 from conespot.scene.sensor import Sensor, Srgb8
 from conespot.scene.spectrum import Curve
 from conespot.scene.spotlights import RIGS, Instrument, Spotlights, spotlight_axes
+from conespot.scene.storage import Storage
 from conespot.scene.surface import AnySurface, Surface
 from conespot.scene.text_file import at_home
 
@@ -47,6 +48,7 @@ class Scene(Model):
     surface: AnySurface = Surface()
     retina: Retina = PhotoRetina()
     sensor: Sensor = Srgb8()
+    storage: Storage = Storage()  #: of frames that come from outside; no rendering asks
     interreflection: Globe | None = None
     motion: AnyMotion = None
     #: by name, all that look at the same instant, of which `camera` is one: a stereo pair's left and right

@@ -16,6 +16,20 @@ def read_text(path: Path, most: int, what: str) -> str:
     Raises ValueError, which names the file, for one that cannot be read, is larger, or is in another encoding. A named
     pipe that nobody writes to is empty.
     """
+    raw = read_bytes(path, most, what)
+    encoding = next((name for mark, name in _MARKS.items() if raw.startswith(mark)), "utf-8")
+    try:
+        return raw.decode(encoding)
+    except UnicodeDecodeError as error:
+        line = raw[: error.start].count(b"\n") + 1
+        raise ValueError(f"{path}:{line}: is no text in UTF-8 ({error.reason}); save the {what} as UTF-8") from None
+
+
+def read_bytes(path: Path, most: int, what: str) -> bytes:
+    """The bytes of a file or a pipe, `most` of them; `what` is what it should hold.
+
+    Raises ValueError, which names the file, for one that cannot be read or is larger.
+    """
     path = at_home(path)
     try:
         raw = _read(path, most + 1)
@@ -24,12 +38,7 @@ def read_text(path: Path, most: int, what: str) -> str:
         raise ValueError(f"{path}: cannot be read: {reason}") from None
     if len(raw) > most:
         raise ValueError(f"{path}: larger than {most / 1e6:g} MB, which no {what} needs")
-    encoding = next((name for mark, name in _MARKS.items() if raw.startswith(mark)), "utf-8")
-    try:
-        return raw.decode(encoding)
-    except UnicodeDecodeError as error:
-        line = raw[: error.start].count(b"\n") + 1
-        raise ValueError(f"{path}:{line}: is no text in UTF-8 ({error.reason}); save the {what} as UTF-8") from None
+    return raw
 
 
 def at_home(path: Path) -> Path:

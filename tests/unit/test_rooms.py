@@ -26,6 +26,7 @@ INNER_ROOMS = {
     "edge": {"model"},
     "field": {"model"},
     "theory": {"model"},
+    "frames": set(),
 }
 
 

@@ -1,0 +1,192 @@
+"""One picture from a file: PNG, TIFF, JPEG or EXR, known by its first bytes, of 8 to 16 bits or float.
+
+Pillow reads headers and JPEG, OpenCV unpacks PNG and TIFF with all their bits, OpenEXR reads EXR.
+"""
+
+from __future__ import annotations
+
+import io
+import warnings
+from pathlib import Path
+from typing import Any
+
+import cv2
+import numpy as np
+
+from conespot.localize.frames.stored import Pixels, Stored, Transfer, Turn, check_size
+from conespot.scene.document import InputError
+from conespot.scene.exr import read_exr
+from conespot.scene.scene import Scene
+from conespot.scene.text_file import read_bytes
+
+#: what a file's first bytes say it is
+MAGIC = {
+    b"\x89PNG\r\n\x1a\n": "PNG",
+    b"\xff\xd8\xff": "JPEG",
+    b"II*\0": "TIFF",
+    b"MM\0*": "TIFF",
+    b"II+\0": "BigTIFF",
+    b"MM\0+": "BigTIFF",
+    b"\x76\x2f\x31\x01": "EXR",
+}
+#: bytes of a file a pixel of the frame, and beside: four floats, twice, and room for what cameras write into headers
+_MOST_BYTES, _BESIDE_BYTES = 32, 8_000_000
+_ORIENTATION = 274
+_TIFF_KINDS = {0: "white is zero", 3: "a palette", 4: "a mask", 5: "CMYK", 6: "YCbCr", 8: "CIELAB"}
+
+
+def kind_of(path: Path) -> str | None:
+    """`PNG`, `JPEG`, `TIFF`, `BigTIFF` or `EXR` by a file's first bytes; None for what is none of them.
+
+    Raises InputError for a file that cannot be read.
+    """
+    if path.exists() and not path.is_file():
+        raise InputError(f"{path}: is a pipe or a device; give a file")
+    try:
+        with open(path, "rb") as file:
+            first = file.read(8)
+    except (OSError, ValueError) as error:
+        raise InputError(f"{path}: cannot be read: {getattr(error, 'strerror', None) or error}") from None
+    return next((kind for magic, kind in MAGIC.items() if first.startswith(magic)), None)
+
+
+def read_still(path: Path, kind: str, scene: Scene) -> Stored:
+    """The picture in a file of a `kind`. Raises InputError for one that is broken, or not of the camera's size."""
+    name = str(path)
+    if kind == "EXR":
+        return _exr(path, scene)
+    if kind == "BigTIFF":
+        raise InputError(f"{name}: is a BigTIFF; save the frame as a TIFF below 4 GB, or as PNG")
+    rows, columns = scene.camera.shape
+    try:
+        raw = read_bytes(path, rows * columns * _MOST_BYTES + _BESIDE_BYTES, f"frame of {columns} x {rows} px")
+    except ValueError as error:
+        raise InputError(str(error)) from None
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")  # Pillow's remarks on headers
+        match kind:
+            case "PNG":
+                return _png(name, raw, scene)
+            case "JPEG":
+                return _jpeg(name, raw, scene)
+            case _:
+                return _tiff(name, raw, scene)
+
+
+def _png(name: str, raw: bytes, scene: Scene) -> Stored:
+    from PIL import Image
+
+    try:
+        head = Image.open(io.BytesIO(raw), formats=["PNG"])
+        turn = Turn.exif(head.getexif().get(_ORIENTATION, 1))
+        size, transfer, several = head.size, _transfer(head.info), getattr(head, "n_frames", 1) > 1
+    except Exception as error:  # whatever Pillow makes of a broken header
+        raise _broken(name, "PNG", error) from None
+    if several:
+        raise InputError(f"{name}: is an animated PNG; save one frame a file")
+    check_size(name, size[1], size[0], (turn, Turn.stated(scene.storage)), scene)
+    try:
+        Image.open(io.BytesIO(raw), formats=["PNG"]).verify()  # every chunk's checksum: libpng would complain on stderr
+    except Exception as error:
+        raise _broken(name, "PNG", error) from None
+    return Stored(_unpacked(name, "PNG", raw), turn, transfer)
+
+
+def _jpeg(name: str, raw: bytes, scene: Scene) -> Stored:
+    from PIL import Image
+
+    try:
+        picture = Image.open(io.BytesIO(raw), formats=["JPEG"])
+        turn, mode = Turn.exif(picture.getexif().get(_ORIENTATION, 1)), picture.mode
+    except Exception as error:
+        raise _broken(name, "JPEG", error) from None
+    if mode not in ("L", "RGB"):
+        raise InputError(f"{name}: is a JPEG in {mode}; save it in grey or RGB")
+    check_size(name, picture.height, picture.width, (turn, Turn.stated(scene.storage)), scene)
+    try:
+        pixels = np.asarray(picture)
+    except Exception as error:
+        raise _broken(name, "JPEG", error) from None
+    return Stored(pixels, turn, _transfer(picture.info))
+
+
+def _tiff(name: str, raw: bytes, scene: Scene) -> Stored:
+    from PIL.TiffImagePlugin import ImageFileDirectory_v2
+
+    stream = io.BytesIO(raw)
+    try:
+        tags = ImageFileDirectory_v2(stream.read(8))
+        stream.seek(tags.next)
+        tags.load(stream)
+        width, height = int(tags[256]), int(tags[257])
+        bits = {int(value) for value in _listed(tags.get(258, 1))}
+        kind, turned = int(tags.get(262, 1)), int(tags.get(_ORIENTATION, 1))
+        several = bool(tags.next)
+    except Exception as error:
+        raise _broken(name, "TIFF", error) from None
+    if several:
+        raise InputError(f"{name}: holds several pages; save one frame a file")
+    if kind in _TIFF_KINDS:
+        raise InputError(f"{name}: is a TIFF of {_TIFF_KINDS[kind]}; save it in grey or RGB, black as zero")
+    if not bits <= {8, 16, 32, 64}:
+        words = ", ".join(map(str, sorted(bits)))
+        raise InputError(f"{name}: has {words} bits a value in its TIFF; save it with 8 or 16, or as 32-bit float")
+    turn = Turn.exif(turned)
+    check_size(name, height, width, (turn, Turn.stated(scene.storage)), scene)
+    # OpenCV turns a TIFF upright by itself
+    return Stored(_unpacked(name, "TIFF", raw))
+
+
+def _unpacked(name: str, kind: str, raw: bytes) -> Pixels:
+    level = cv2.utils.logging.getLogLevel()
+    cv2.utils.logging.setLogLevel(cv2.utils.logging.LOG_LEVEL_SILENT)  # it would complain on stderr too
+    try:
+        found = cv2.imdecode(np.frombuffer(raw, np.uint8), cv2.IMREAD_UNCHANGED)
+    except (cv2.error, MemoryError) as error:
+        raise _broken(name, kind, error) from None
+    finally:
+        cv2.utils.logging.setLogLevel(level)
+    if found is None:
+        raise _broken(name, kind, None)
+    pixels: Pixels = np.asarray(found)
+    if pixels.dtype not in (np.uint8, np.uint16, np.float32, np.float64):
+        raise InputError(f"{name}: pixels of type {pixels.dtype} cannot be read; save 8 or 16 bits, or 32-bit float")
+    if pixels.ndim == 3:
+        pixels = pixels[..., 0] if pixels.shape[2] == 1 else pixels[..., [2, 1, 0, 3][: pixels.shape[2]]]
+    return pixels
+
+
+def _exr(path: Path, scene: Scene) -> Stored:
+    stated = (Turn.stated(scene.storage),)
+    try:
+        found, header = read_exr(path, lambda rows, columns: check_size(str(path), rows, columns, stated, scene))
+    except ValueError as error:
+        raise _broken(str(path), "EXR", error) from None
+    names = next((names for names in (["Y"], list("RGB"), ["C0", "C1", "C2"]) if set(names) <= set(found)), None)
+    if names is None:
+        said = ", ".join(sorted(found)[:8])
+        raise InputError(f"{path}: has the channels {said}; give R, G and B, or Y alone, in one layer")
+    picture = np.stack([found[name] for name in names], axis=-1)
+    radiance = str(header.get("conespot.unit", "")).startswith("W")
+    return Stored(picture[..., 0] if len(names) == 1 else picture, transfer="linear", radiance=radiance)
+
+
+def _transfer(info: dict[Any, Any]) -> Transfer | None:
+    """What a PNG's or a JPEG's header says of the transfer of its values."""
+    if profile := info.get("icc_profile"):
+        return "srgb" if b"sRGB" in bytes(profile).replace(b"\0", b"") else "other"
+    if "srgb" in info:
+        return "srgb"
+    if "gamma" not in info:
+        return None
+    known: tuple[tuple[float, Transfer], ...] = ((1.0 / 2.2, "srgb"), (1.0, "linear"))
+    return next((said for gamma, said in known if abs(float(info["gamma"]) - gamma) < 0.01), "other")
+
+
+def _listed(value: Any) -> tuple[Any, ...]:
+    return value if isinstance(value, tuple) else (value,)
+
+
+def _broken(name: str, kind: str, error: BaseException | None) -> InputError:
+    reason = " ".join(str(error).split()) if error is not None and str(error) else "its data end early or are damaged"
+    return InputError(f"{name}: cannot be read as {kind}: {reason[:200]}")
