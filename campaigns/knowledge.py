@@ -55,6 +55,7 @@ class Knowledge(Model):
     eye_radius_sigma: LengthSigma = 0.0
     camera_height_error: Length = Field(0.0, ge=0.0)
     camera_height_sigma: LengthSigma = 0.0
+    semi_axes_sigma: LengthSigma = 0.0
     surface: AnySurface | None = None
     reference: int = Field(0, ge=0, le=1000, strict=True)
     sequence: int = Field(0, ge=0, le=1000, strict=True)
@@ -76,6 +77,7 @@ class Knowledge(Model):
             half_angle_sigma_deg=None if angle is None else math.degrees(angle),
             eye_radius_sigma_mm=self.eye_radius_sigma,
             camera_height_sigma_mm=self.camera_height_sigma,
+            semi_axes_sigma_mm=self.semi_axes_sigma,
         )
 
     def told(self, scene: Scene, rng: np.random.Generator) -> Scene:

@@ -59,6 +59,7 @@ class CalibrationSettings:
         softness_sigma=0.01,
         eye_radius_sigma_mm=0.01,
         camera_height_sigma_mm=0.03,
+        semi_axes_sigma_mm=0.01,
     )
 
 
@@ -77,6 +78,7 @@ class Width:
     softness: float = 0.1  #: of a `cycles` beam
     eye_radius_mm: float = 0.3
     camera_height_mm: float = 0.5
+    semi_axes_mm: float = 0.0  #: of the retina, told exactly where it is 0
     rcm_mm: float = 0.2
     play_mm: float = 0.005  #: by how much the needle's axis misses the RCM at random
 
@@ -84,21 +86,21 @@ class Width:
         """In the order of `NAMES` and the units held inside; a beam without a softness has that of 0, exactly."""
         softness = self.softness if _has_softness(scene) else _FIXED
         own = [np.radians(self.half_angle_deg), softness, self.eye_radius_mm, self.camera_height_mm]
-        return np.array([*own, *[self.rcm_mm] * 3])
+        return np.array([*own, *[self.semi_axes_mm or _FIXED] * 3, *[self.rcm_mm] * 3])
 
 
 @dataclass(frozen=True)
 class Calibration:
     """What a sequence says about the scene's quantities `NAMES` [rad, 1, mm]."""
 
-    values: Array  #: `[7]`
-    covariance: Array  #: `[7, 7]`
+    values: Array  #: `[10]`
+    covariance: Array  #: `[10, 10]`
     observable: dict[str, bool]
     frames: int  #: that took part
 
     @property
     def sigmas(self) -> Array:
-        """Standard deviations `[7]` [rad, 1, mm]."""
+        """Standard deviations `[10]` [rad, 1, mm]."""
         return np.sqrt(np.diag(self.covariance))
 
     def statement(self) -> str:
@@ -135,7 +137,11 @@ def calibrate(
     nominal = _values(scene)
     widths = width.sigmas(scene)
     prior = 1.0 / np.square(widths)
-    tight = replace(CALIBRATION.tight, softness_sigma=CALIBRATION.tight.softness_sigma if _has_softness(scene) else 0.0)
+    tight = CALIBRATION.tight
+    if not _has_softness(scene):
+        tight = replace(tight, softness_sigma=0.0)
+    if not width.semi_axes_mm:
+        tight = replace(tight, semi_axes_sigma_mm=0.0)
     now, found, used = scene, nominal, 0
     covariance = np.diag(1.0 / prior)
     for _ in range(CALIBRATION.rounds):
@@ -175,7 +181,7 @@ def _values(scene: Scene) -> Array:
 
 
 def _with_values(scene: Scene, values: Array, taken: Sequence[bool]) -> Scene:
-    """The scene with those of the values `[7]` that are `taken`."""
+    """The scene with those of the values `[10]` that are `taken`."""
     for quantity, new, take in zip(QUANTITIES, values, taken, strict=False):
         if take and quantity.read(scene) is not None:
             scene = quantity.write(scene, float(new))

@@ -26,6 +26,8 @@ class Knowns:
     softness_sigma: float | None = 0.0  #: of a `cycles` beam's blend
     eye_radius_sigma_mm: float | None = 0.0
     camera_height_sigma_mm: float | None = 0.0
+    #: of each of the retina's semi-axes: `scene.population.SEMI_AXES_SIGMA_MM` about the mean eye for an unknown one
+    semi_axes_sigma_mm: float | None = 0.0
 
     def __post_init__(self) -> None:
         for name, value in vars(self).items():

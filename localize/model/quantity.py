@@ -45,6 +45,21 @@ def _with_softness(scene: Scene, new: float) -> Scene:
     return scene.model_copy(update={"beam": scene.beam.model_copy(update={"blend": max(new, _HARDEST)})})
 
 
+def _semi_axis(name: str, along: int) -> Quantity:
+    """One of the retina's semi-axes [mm]: along x, y or z."""
+
+    def read(scene: Scene) -> float:
+        return scene.eye.radius * scene.surface.semi_axes[along]
+
+    def write(scene: Scene, new: float) -> Scene:
+        ratios = list(scene.surface.semi_axes)
+        ratios[along] = new / scene.eye.radius
+        surface = scene.surface.model_copy(update={"semi_axes": tuple(ratios)})
+        return scene.model_copy(update={"surface": surface})
+
+    return Quantity(name, read, write, changes="sight", step=1e-3, known="semi_axes_sigma_mm", unit="mm")
+
+
 #: in the order in which they join the parameters of a fit
 QUANTITIES = (
     Quantity(
@@ -85,6 +100,9 @@ QUANTITIES = (
         known="camera_height_sigma_mm",
         unit="mm",
     ),
+    _semi_axis("retina_width", 0),
+    _semi_axis("retina_height", 1),
+    _semi_axis("retina_length", 2),
 )
 
 

@@ -44,7 +44,7 @@ def test_one_spotlight_tells_neither_half_angle_nor_camera_height_and_says_so():
     poses = [true.pose(np.array([2.0 * math.sin(t), 2.0 * math.cos(t), 2.5 + 0.4 * t])) for t in range(6)]
     frames = [photograph(true, pose, seed=i, rays=6) for i, pose in enumerate(poses)]
     found = calibrate(lambda: frames, believed, noise=NOISE)
-    truth = np.array([math.radians(9.03), 0.0, 12.0, 110.0, 6.05, -0.04, 22.1])
+    truth = np.array([math.radians(9.03), 0.0, 12.0, 110.0, 12.0, 12.0, 12.0, 6.05, -0.04, 22.1])
     assert np.all(np.abs(found.values - truth) < 4.0 * found.sigmas)
     assert not found.observable["half_angle"]
     assert not found.observable["camera_height"]

@@ -11,6 +11,9 @@ from conespot.localize.sequence import locate_sequence
 from conespot.localize.theory.bounds import cramer_rao
 from conespot.scene import InputError, Pose
 from conespot.scene.beam import CyclesBeam, HardBeam
+from conespot.scene.eye import Eye
+from conespot.scene.population import SEMI_AXES_SIGMA_MM
+from conespot.scene.surface import Surface
 
 FREE = Knowns(rcm_sigma_mm=None)
 
@@ -181,3 +184,20 @@ def test_knowns_refuse_nonsense_and_published_methods_refuse_knowns():
         cramer_rao(scene, scene.pose(np.array([0.0, 0.0, 4.0])), knowns=Knowns(softness_sigma=0.1))
     with pytest.raises(InputError, match="no use for knowns"):
         locate(np.zeros((100, 100), np.uint8), scene, "paper", knowns=FREE)
+
+
+def test_an_eye_of_unknown_shape_is_estimated_beside_the_pose():
+    """Told the mean eye of the population, its shape free within the population's scatter: one hard frame suffices."""
+    scene = scene_of(HardBeam(), eye=Eye(radius=10.311), surface=Surface.model_validate({"population": 2}))
+    told = scene.model_copy(update={"surface": Surface.model_validate({"population": "mean"})})
+    apex = np.array([0.5, 0.3, 4.0])
+    image = photograph(scene, scene.pose(apex), rays=8)
+    guess, exact = (
+        locate(image, told, "cone", knowns=Knowns(rcm_sigma_mm=None, semi_axes_sigma_mm=sigma), noise=NOISE)
+        for sigma in (SEMI_AXES_SIGMA_MM, 0.0)
+    )
+    assert guess
+    off = guess.apex_mm - apex
+    assert off @ np.linalg.solve(guess.covariance[:3, :3], off) < 16.3  # 99.9 % of answers
+    assert np.linalg.norm(off) < 0.015
+    assert not exact or np.linalg.norm(exact.apex_mm - apex) > 3.0 * np.linalg.norm(off)
