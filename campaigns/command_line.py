@@ -65,6 +65,10 @@ def _add_campaigns(add: _Add) -> None:
     run.add_argument("--log", metavar="FILE", type=Path, help="append what happens to a file, a JSON object a line")
     listed = add(subcommands.list, "list the shipped campaigns")
     listed.add_argument("--localizers", action="store_true", help="list the localizers in their place")
+    explain = add(subcommands.explain, "say what a key of campaigns and scenes means")
+    explain.add_argument("key", metavar="KEY", help="its dotted path, such as scene.beam.half_angle, or the end of it")
+    schema = add(subcommands.schema, "print the JSON Schema of campaigns, with which editors complete and check them")
+    schema.add_argument("--scene", action="store_true", help="that of a scene's file, such as a preset, in its place")
     add(subcommands.show, "print a campaign's file").add_argument("campaign")
 
 

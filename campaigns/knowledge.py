@@ -15,7 +15,7 @@ from pydantic import BeforeValidator, Field, PlainSerializer, model_validator
 
 from conespot.localize.model.knowns import RCM_SIGMA_MM, Knowns
 from conespot.scene import Scene
-from conespot.scene.model import Model
+from conespot.scene.model import Model, Words
 from conespot.scene.quantity import Angle, Length, format_quantity
 from conespot.scene.surface import AnySurface
 
@@ -27,6 +27,7 @@ def _sigma(kind: str, quantity: Any) -> Any:
     return Annotated[
         Annotated[quantity, Field(ge=0.0)] | None,
         BeforeValidator(lambda value: None if value == FREE else value),
+        Words(lambda: [FREE]),
         PlainSerializer(lambda v: FREE if v is None else format_quantity(v, kind), when_used="json"),
     ]
 

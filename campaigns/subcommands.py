@@ -171,6 +171,25 @@ def show(options: argparse.Namespace) -> Ending:
     return Ending.DONE
 
 
+def explain(options: argparse.Namespace) -> Ending:
+    """Say what a key means."""
+    from conespot.campaigns.explain import explain
+
+    for line in explain(options.key):
+        _say(line)
+    return Ending.DONE
+
+
+def schema(options: argparse.Namespace) -> Ending:
+    """Print a JSON Schema."""
+    import json
+
+    from conespot.campaigns.json_schema import campaign_schema, scene_schema
+
+    _say(json.dumps(scene_schema() if options.scene else campaign_schema(), indent=1))
+    return Ending.DONE
+
+
 def doctor(options: argparse.Namespace) -> Ending:
     """Say what this machine renders with."""
     from conespot.render import kept

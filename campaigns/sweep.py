@@ -19,8 +19,8 @@ from conespot.scene.document import Document, Path_
 
 MAX_COMBINATIONS = 10_000
 CASE = ("scene", "trajectory", "poses", "localizers", "knowledge", "samples", "edge_samples")
-_SWEPT = (*CASE, "seed")
-_NAME = re.compile(r"[a-z][a-z0-9_]{0,39}")
+SWEPT = (*CASE, "seed")
+OWN_NAME = re.compile(r"[a-z][a-z0-9_]{0,39}")
 _COLUMNS = {column.name for column in COLUMNS}
 
 
@@ -67,7 +67,7 @@ def sweep_products(document: Document) -> list[list[Axis]]:
 
 
 def _axis(document: Document, key: str, items: Any, at: Path_) -> Axis:
-    if isinstance(items, dict) and key.split(".")[0] not in _SWEPT:
+    if isinstance(items, dict) and key.split(".")[0] not in SWEPT:
         return _named(document, key, items, at)
     _check(document, key, at, "sweep")
     if not isinstance(items, list) or not items:
@@ -79,7 +79,7 @@ def _axis(document: Document, key: str, items: Any, at: Path_) -> Axis:
 def _named(document: Document, name: str, items: dict[str, Any], at: Path_) -> Axis:
     """An axis of named choices."""
     where = f"{document.place(at)}: sweep"
-    if name in _COLUMNS or name.startswith("est_") or not _NAME.fullmatch(name):
+    if name in _COLUMNS or name.startswith("est_") or not OWN_NAME.fullmatch(name):
         raise InputError(
             f"{where}: '{name}' cannot name choices; take small letters, digits and _, and no column of the rows"
         )
@@ -99,9 +99,9 @@ def _named(document: Document, name: str, items: dict[str, Any], at: Path_) -> A
 
 def _check(document: Document, key: str, at: Path_, where: str) -> None:
     root = key.split(".")[0]
-    if root not in _SWEPT:
-        near = difflib.get_close_matches(root, _SWEPT, n=1)
-        hint = f"did you mean '{near[0]}'?" if near else f"what can be: {', '.join(_SWEPT)}"
+    if root not in SWEPT:
+        near = difflib.get_close_matches(root, SWEPT, n=1)
+        hint = f"did you mean '{near[0]}'?" if near else f"what can be: {', '.join(SWEPT)}"
         raise InputError(f"{document.place(at)}: {where}: '{root}' cannot be swept; {hint}")
 
 

@@ -14,9 +14,9 @@ from conespot.scene import attitude, defocus
 from conespot.scene.calibration_file import calibrated
 from conespot.scene.distortion import Distortion
 from conespot.scene.lens import AnyLens
-from conespot.scene.model import Model
+from conespot.scene.model import Model, Text
 from conespot.scene.optics import SODIUM, AnyOptics
-from conespot.scene.quantity import Angle, Length, parse_quantity
+from conespot.scene.quantity import Angle, Length, Quantity, parse_quantity
 from conespot.scene.rays import Rays
 from conespot.scene.refracted import found, refracted
 from conespot.scene.resolution import Resolution
@@ -32,7 +32,7 @@ def _pixels(value: object) -> float:
     return parse_quantity(value, "pixels")
 
 
-_Pixels = Annotated[float, BeforeValidator(_pixels)]
+_Pixels = Annotated[float, BeforeValidator(_pixels), Text(Quantity("pixels").pattern)]
 
 
 class Camera(Model):

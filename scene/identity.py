@@ -42,7 +42,7 @@ def essence(description: BaseModel) -> dict[str, Any]:
 
 def _essence(value: object, written: Any) -> Any:
     if isinstance(value, BaseModel):
-        default = _defaults(type(value))
+        default = defaults(type(value))
         # a kind is never left out: two kinds with nothing but defaults would be one
         return {
             name: _essence(getattr(value, name), plain)
@@ -58,7 +58,7 @@ def _essence(value: object, written: Any) -> Any:
 
 
 @functools.cache
-def _defaults(kind: type[BaseModel]) -> dict[str, Any]:
-    """What a file would hold of the keys that have a default."""
+def defaults(kind: type[BaseModel]) -> dict[str, Any]:
+    """What a file would hold of the keys of a description that have a default."""
     values = {n: f.get_default(call_default_factory=True) for n, f in kind.model_fields.items() if not f.is_required()}
     return kind.model_construct(**values).model_dump(mode="json", include=set(values))

@@ -16,7 +16,7 @@ from pydantic import BeforeValidator, Field, ValidationError, ValidationInfo, mo
 
 from conespot.scene.document import InputError
 from conespot.scene.installed import described, loaded, offered, sentence
-from conespot.scene.model import Model, unknown_name
+from conespot.scene.model import Model, Words, unknown_name
 from conespot.scene.quantity import Angle, Irradiance, Wavelength
 from conespot.scene.spectrum import Curve, read_curve, tabulated
 from conespot.scene.text_file import at_home
@@ -195,6 +195,10 @@ def light_name(light: Light) -> str:
     return light.name
 
 
+def _lights() -> list[str]:
+    return [*LIGHTS, *offered(GROUP)]
+
+
 def _named_light(value: Any, info: ValidationInfo) -> Any:
     if isinstance(value, str):
         if value in LIGHTS:
@@ -212,7 +216,7 @@ def _named_light(value: Any, info: ValidationInfo) -> Any:
     return value
 
 
-Illumination = Annotated[Annotated[Light, Field(discriminator="kind")], BeforeValidator(_named_light)]
+Illumination = Annotated[Annotated[Light, Field(discriminator="kind")], BeforeValidator(_named_light), Words(_lights)]
 
 
 class Ambient(Model):

@@ -7,7 +7,7 @@ from typing import Annotated, Any
 
 from pydantic import BeforeValidator, Field, model_validator
 
-from conespot.scene.model import Model
+from conespot.scene.model import Model, Words
 from conespot.scene.point_spread import PointSpread
 from conespot.scene.quantity import Length, format_quantity
 
@@ -61,4 +61,4 @@ def _none(value: Any) -> Any:
 
 
 #: what the key of a file holds: `none`, or the lens
-AnyLens = Annotated[Lens | None, BeforeValidator(_none)]
+AnyLens = Annotated[Lens | None, BeforeValidator(_none), Words(lambda: ["none"])]

@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import difflib
-from collections.abc import Mapping
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass
 from typing import Any
 
-from pydantic import BaseModel, BeforeValidator, ConfigDict, model_validator
-from pydantic_core import PydanticCustomError
+from pydantic import BaseModel, ConfigDict, GetCoreSchemaHandler, GetJsonSchemaHandler, model_validator
+from pydantic.json_schema import JsonSchemaValue
+from pydantic_core import CoreSchema, PydanticCustomError, core_schema
 
 
 class Model(BaseModel):
@@ -42,14 +44,47 @@ def unknown_name(name: str, known: list[str], what: str) -> PydanticCustomError:
     )
 
 
-def named(known: Mapping[str, Any], what: str) -> BeforeValidator:
-    """Lets a file name one of `known` (a `what`) in place of writing it out."""
+@dataclass(frozen=True, eq=False)
+class Words:
+    """Marks a type that a file may also give by a word alone, for whoever describes the types."""
 
-    def look_up(value: Any) -> Any:
+    known: Callable[[], Iterable[str]]
+
+    def __get_pydantic_json_schema__(self, schema: CoreSchema, handler: GetJsonSchemaHandler) -> JsonSchemaValue:
+        """One of the words, or what the type is else."""
+        return {"anyOf": [{"enum": list(self.known())}, handler(schema)]}
+
+
+@dataclass(frozen=True, eq=False)
+class Text:
+    """Marks a type that a file may also give as a text of a `pattern`, for whoever describes the types."""
+
+    pattern: str
+
+    def __get_pydantic_json_schema__(self, schema: CoreSchema, handler: GetJsonSchemaHandler) -> JsonSchemaValue:
+        """Such a text, or what the type is else."""
+        return {"anyOf": [{"type": "string", "pattern": self.pattern}, handler(schema)]}
+
+
+@dataclass(frozen=True, eq=False)
+class Named(Words):
+    """Lets a file name one of `choices` (a `what`) in place of writing it out."""
+
+    choices: Mapping[str, Any]
+    what: str
+
+    def __get_pydantic_core_schema__(self, source: Any, handler: GetCoreSchemaHandler) -> CoreSchema:
+        """Looks a word up before anything else is read."""
+        return core_schema.no_info_before_validator_function(self._look_up, handler(source))
+
+    def _look_up(self, value: Any) -> Any:
         if not isinstance(value, str):
             return value
-        if value not in known:
-            raise unknown_name(value, list(known), what)
-        return known[value]
+        if value not in self.choices:
+            raise unknown_name(value, list(self.choices), self.what)
+        return self.choices[value]
 
-    return BeforeValidator(look_up)
+
+def named(known: Mapping[str, Any], what: str) -> Named:
+    """Lets a file name one of `known` (a `what`) in place of writing it out."""
+    return Named(lambda: known, known, what)

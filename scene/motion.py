@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from pydantic import BeforeValidator, Field, model_validator
 
-from conespot.scene.model import Model
+from conespot.scene.model import Model, Words
 from conespot.scene.pose import Pose
 from conespot.scene.quantity import Hertz, Length, Seconds, Speed, format_quantity
 from conespot.scene.sensor import AnySensor
@@ -141,7 +141,9 @@ def _written(value: Any) -> Any:
 
 
 #: what the key of a file holds: `none`, a kind's name or the motion
-AnyMotion = Annotated[Annotated[Motion, Field(discriminator="kind")] | None, BeforeValidator(_written)]
+AnyMotion = Annotated[
+    Annotated[Motion, Field(discriminator="kind")] | None, BeforeValidator(_written), Words(lambda: ["none", "tremor"])
+]
 
 
 def exposure_of(motion: Motion, sensor: AnySensor) -> float:

@@ -15,7 +15,7 @@ from pydantic import BeforeValidator, Field, model_validator
 
 from conespot.scene import media
 from conespot.scene.media import Medium, Numbers
-from conespot.scene.model import Model
+from conespot.scene.model import Model, Words
 from conespot.scene.quantity import Dioptres, Length, format_quantity
 from conespot.scene.refraction import Interface, Root, Vector, through, to_plane
 
@@ -204,4 +204,4 @@ def _none(value: object) -> object:
 
 
 #: what the key of a file holds: `none`, or the optics
-AnyOptics = Annotated[Optics | None, BeforeValidator(_none)]
+AnyOptics = Annotated[Optics | None, BeforeValidator(_none), Words(lambda: ["none"])]

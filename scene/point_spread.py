@@ -9,8 +9,8 @@ import numpy as np
 from pydantic import BeforeValidator, Field, ValidationInfo, model_validator
 
 from conespot.scene.csv_lines import CsvLine, csv_lines
-from conespot.scene.model import Model
-from conespot.scene.quantity import Length, format_quantity, parse_quantity
+from conespot.scene.model import Model, Text, Words
+from conespot.scene.quantity import Length, Quantity, format_quantity, parse_quantity
 from conespot.scene.text_file import at_home
 
 #: no residual spread is wider [mm]: what is more is glare
@@ -95,5 +95,8 @@ def _spread(value: Any, info: ValidationInfo) -> Any:
 
 #: what the key of a file holds: `none`, a Gaussian's sigma, a file or a profile
 PointSpread = Annotated[
-    Annotated[GaussianSpread | TabulatedSpread, Field(discriminator="kind")] | None, BeforeValidator(_spread)
+    Annotated[GaussianSpread | TabulatedSpread, Field(discriminator="kind")] | None,
+    BeforeValidator(_spread),
+    Words(lambda: ["none"]),
+    Text(Quantity("length").pattern),
 ]

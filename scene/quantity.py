@@ -8,10 +8,12 @@ from __future__ import annotations
 
 import math
 import re
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Annotated, Any
 
-from pydantic import BeforeValidator, PlainSerializer, ValidationInfo
-from pydantic_core import PydanticCustomError
+from pydantic import BeforeValidator, GetJsonSchemaHandler, PlainSerializer, ValidationInfo
+from pydantic.json_schema import JsonSchemaValue
+from pydantic_core import CoreSchema, PydanticCustomError
 
 #: context key that marks data read from a file, where a bare number is refused
 FROM_FILE = "from_file"
@@ -86,6 +88,23 @@ def in_unit_of(written: str, value: float) -> str:
     return f"{value / factors.pop():.12g} {match[2]}" if match and len(factors) == 1 else f"{value:g}"
 
 
+@dataclass(frozen=True)
+class Quantity:
+    """Marks a type as a quantity of a kind, for whoever describes the types: a JSON Schema, `campaign explain`."""
+
+    kind: str
+
+    @property
+    def pattern(self) -> str:
+        """A regular expression, as JSON Schema has them, for how it is written."""
+        number = r"[+-]?([0-9]+\.?[0-9]*|\.[0-9]+)([eE][+-]?[0-9]+)?"
+        return rf"^\s*{number}\s*({'|'.join(UNITS[self.kind])})\s*$"
+
+    def __get_pydantic_json_schema__(self, schema: CoreSchema, handler: GetJsonSchemaHandler) -> JsonSchemaValue:
+        """In a file it is a text with a unit."""
+        return {"type": "string", "pattern": self.pattern, "examples": [f"1 {WRITTEN[self.kind]}"]}
+
+
 def _quantity(kind: str) -> Any:
     def parse(value: object, info: ValidationInfo) -> float:
         from_file = bool(info.context and info.context.get(FROM_FILE))
@@ -97,7 +116,8 @@ def _quantity(kind: str) -> Any:
     def write(value: float) -> str:
         return format_quantity(value, kind)
 
-    return Annotated[float, BeforeValidator(parse), PlainSerializer(write, return_type=str, when_used="json")]
+    written = PlainSerializer(write, return_type=str, when_used="json")
+    return Annotated[float, BeforeValidator(parse), written, Quantity(kind)]
 
 
 if TYPE_CHECKING:

@@ -7,6 +7,8 @@ from typing import Annotated
 
 from pydantic import BeforeValidator, Field
 
+from conespot.scene.model import Text
+
 _FEWEST, _MOST = 16, 20000
 
 
@@ -24,4 +26,4 @@ def _resolution(value: object) -> object:
 
 _Side = Annotated[int, Field(ge=_FEWEST, le=_MOST)]
 #: pixels a side, or (width, height) [px]
-Resolution = Annotated[_Side | tuple[_Side, _Side], BeforeValidator(_resolution)]
+Resolution = Annotated[_Side | tuple[_Side, _Side], BeforeValidator(_resolution), Text(r"^\s*\d+\s*[xX×]\s*\d+\s*$")]

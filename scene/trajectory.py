@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from pydantic import BeforeValidator, Field, ValidationInfo
 
 from conespot.scene.csv_lines import CsvLine, columns, csv_lines, within
-from conespot.scene.model import Model, unknown_name
+from conespot.scene.model import Model, Words, unknown_name
 from conespot.scene.quantity import Length, Seconds, parse_quantity
 from conespot.scene.text_file import at_home
 
@@ -208,4 +208,4 @@ def _named_trajectory(value: Any, info: ValidationInfo) -> Any:
     return value
 
 
-AnyTrajectory = Annotated[Trajectory, BeforeValidator(_named_trajectory)]
+AnyTrajectory = Annotated[Trajectory, BeforeValidator(_named_trajectory), Words(lambda: KINDS)]
