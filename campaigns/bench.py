@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import itertools
+import math
 from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -12,8 +13,8 @@ import numpy as np
 
 from conespot.campaigns.maker import made_with, maker
 from conespot.campaigns.plan import Case, Group, Plan, Unit, frame_seed, reference_seed, tile_seed, told
-from conespot.campaigns.row import FARTHEST, Finding, Record
-from conespot.localize import LocalizationFailure, find_localizer, locate
+from conespot.campaigns.row import FARTHEST, Finding, Record, Ways
+from conespot.localize import Localization, LocalizationFailure, find_localizer, locate
 from conespot.localize.image import AnyImage, Reference
 from conespot.localize.outcome import Outcome
 from conespot.scene import Pose
@@ -202,12 +203,25 @@ def finding(case: Case, localizer: str, found: Outcome, bound: float | None) -> 
         return Finding(case=case.key, localizer=localizer, reason=found.reason[:1000], bound=bound)
     if np.max(np.abs(found.apex_mm)) > FARTHEST:
         return Finding(case=case.key, localizer=localizer, reason="the tip is out of this world", bound=bound)
+    ways, sigmas = _distances(found)
     return Finding(
         case=case.key,
         localizer=localizer,
+        distance=ways,
+        distance_sigma=sigmas,
         apex=found.apex_mm.tolist(),
         axis=found.axis.tolist(),
         roll=found.roll,
         covariance=None if found.covariance is None else tuple(map(tuple, found.covariance.tolist())),
         bound=bound,
     )
+
+
+def _distances(found: Localization) -> tuple[Ways | None, Ways | None]:
+    """From the wall's nearest point and along the axis, and their standard deviations; None where there are none."""
+    away = found.distance
+    if away is None or not math.isfinite(away.along_mm):
+        return None, None
+    if away.sigma_nearest_mm is None or away.sigma_along_mm is None:
+        return (away.nearest_mm, away.along_mm), None
+    return (away.nearest_mm, away.along_mm), (away.sigma_nearest_mm, away.sigma_along_mm)

@@ -11,8 +11,9 @@ from typing import TYPE_CHECKING, Annotated
 import numpy as np
 from pydantic import BaseModel, ConfigDict, Field, FiniteFloat, model_validator
 
-from conespot.results.columns import TIP, TIP_ERROR, TIP_SIGMA, TRUE_TIP
+from conespot.results.columns import DISTANCE, TIP, TIP_ERROR, TIP_SIGMA, TRUE_TIP
 from conespot.scene import Pose, Scene
+from conespot.scene.wall import Wall
 
 if TYPE_CHECKING:
     pass
@@ -21,8 +22,11 @@ Vector = tuple[FiniteFloat, FiniteFloat, FiniteFloat]
 #: a tip farther than this [mm] is no answer: rows hold errors up to ten times that
 FARTHEST = 1e8
 _Coordinate = Annotated[FiniteFloat, Field(ge=-FARTHEST, le=FARTHEST)]
+_Sigma = Annotated[FiniteFloat, Field(ge=0.0)]
 Row = dict[str, float]
 _NAN = math.nan
+#: a distance from the wall's nearest point and one along the axis [mm]
+Ways = tuple[float, float]
 _NOWHERE = (_NAN, _NAN, _NAN)
 
 
@@ -43,6 +47,9 @@ class Finding(_Line):
     roll: FiniteFloat | None = None  #: [rad], of localizers that measure it
     #: of the apex [mm], the axis along two tangents [rad] and, with six rows, the roll [rad]
     covariance: Annotated[tuple[tuple[FiniteFloat, ...], ...], Field(min_length=5, max_length=6)] | None = None
+    #: from the wall's nearest point and along the axis [mm], and their standard deviations [mm] where they are known
+    distance: tuple[FiniteFloat, FiniteFloat] | None = None
+    distance_sigma: tuple[_Sigma, _Sigma] | None = None
     bound: Annotated[FiniteFloat, Field(ge=0.0)] | None = None  #: root mean square tip error no estimator beats [mm]
 
     @model_validator(mode="after")
@@ -114,27 +121,34 @@ class Stated:
     sigmas: int = 0  #: the largest covariance, 0 if there is none
     roll: bool = False
     bound: bool = False
+    distance: bool = False
 
     @classmethod
     def among(cls, findings: Iterable[Finding]) -> Stated:
         """The columns that these findings fill."""
-        sigmas, roll, bound = 0, False, False
+        sigmas, roll, bound, distance = 0, False, False, False
         for found in findings:
             sigmas = max(sigmas, len(found.covariance or ()))
             roll, bound = roll or found.roll is not None, bound or found.bound is not None
-        return cls(sigmas, roll, bound)
+            distance = distance or found.distance is not None
+        return cls(sigmas, roll, bound, distance)
 
     @classmethod
     def by(cls, several: Iterable[Stated]) -> Stated:
         """The columns that any of them fills."""
         kinds = set(several)
-        return cls(max((k.sigmas for k in kinds), default=0), any(k.roll for k in kinds), any(k.bound for k in kinds))
+        return cls(
+            max((k.sigmas for k in kinds), default=0),
+            any(k.roll for k in kinds),
+            any(k.bound for k in kinds),
+            any(k.distance for k in kinds),
+        )
 
-    def row(self, true: Pose, found: Finding | None, visible: float | None) -> Row:
+    def row(self, true: Pose, found: Finding | None, visible: float | None, wall: Ways | None = None) -> Row:
         """Standard deviations and how well they hold, roll and bound; NaN where there is none.
 
         `est_chi2_tip` is the tip's error in units of its own covariance: chi-squared of three degrees if that is
-        right. `visible` is the share of the patches' true outline that the frame shows.
+        right. `visible` is the share of the patches' true outline that the frame shows, `wall` the true distances.
         """
         row: Row = {}
         if self.sigmas:
@@ -153,9 +167,26 @@ class Stated:
         if self.roll:
             off = None if found is None or found.roll is None else math.remainder(found.roll - true.roll, 2.0 * math.pi)
             row["est_roll_error_deg"] = _NAN if off is None else math.degrees(off)
+        if self.distance:
+            nearest, along = (found and found.distance) or (_NAN, _NAN)
+            sigmas = (found and found.distance_sigma) or (_NAN, _NAN)
+            true_nearest, true_along = wall or (_NAN, _NAN)
+            for name, pair in {
+                "true_{}_mm": (true_nearest, true_along),
+                "est_{}_mm": (nearest, along),
+                "est_sigma_{}_mm": sigmas,
+                "est_error_{}_mm": (nearest - true_nearest, along - true_along),
+            }.items():
+                row |= {name.format(way): value for way, value in zip(DISTANCE, pair, strict=True)}
         if self.bound:
             row["est_bound_mm"] = _NAN if found is None or found.bound is None else found.bound
         return row
+
+
+def wall_distances(pose: Pose, scene: Scene) -> Ways:
+    """The true distances of a pose's tip from a scene's wall [mm]: from its nearest point, and along the axis."""
+    along, nearest = Wall.about(scene, pose.apex, pose.axis).distances
+    return float(nearest), float(along)
 
 
 def in_frame(pose: Pose, scene: Scene) -> float:

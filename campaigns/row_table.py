@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from conespot.campaigns.plan import Case, Group, Plan
-from conespot.campaigns.row import Record, Stated, errors, in_frame
+from conespot.campaigns.row import Record, Stated, errors, in_frame, wall_distances
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -61,9 +61,10 @@ def _rows(
     pose = group.pose(number)
     answers = {(found.case, found.localizer): found for found in record.findings}
     visible = in_frame(pose, group.scene) if stated.sigmas else None
+    wall = wall_distances(pose, group.scene) if stated.distance else None
     for case in group.cases:
         rcm = case.scene.instrument.rcm
         for name in case.localizers:
             found = answers.get((case.key, name))
             reason = record.error if found is None else found.reason
-            yield case, name, reason, errors(pose, found, rcm) | stated.row(pose, found, visible)
+            yield case, name, reason, errors(pose, found, rcm) | stated.row(pose, found, visible, wall)

@@ -7,6 +7,7 @@ from collections.abc import Iterator
 
 from numpy.typing import ArrayLike
 
+from conespot.localize.distance import with_distance
 from conespot.localize.image import AnyImage, Reference, checked
 from conespot.localize.localizer import Beside, Localizer
 from conespot.localize.model.knowns import Knowns
@@ -109,8 +110,10 @@ def locate(
     answer with a covariance.
 
     Returns a Localization (`apex_mm [3]`, unit `axis [3]` from the RCM into the light), or a LocalizationFailure,
-    which is falsy and has a `reason`. Raises InputError for an unknown localizer, an image that cannot be read or
-    does not fit the scene, and a missing or unwanted `oracle`.
+    which is falsy and has a `reason`. A localization knows the tip's `distance` from the wall.
+
+    Raises InputError for an unknown localizer, an image that cannot be read or does not fit the scene, and a missing
+    or unwanted `oracle`.
     """
     entry = find_localizer(localizer)
     if entry.needs_truth and oracle is None:
@@ -125,4 +128,5 @@ def locate(
                     f"localizer '{localizer}' has no use for {name}=; leave it out, or take one of {others}"
                 )
     unlit = None if reference is None else Reference.of(reference, scene)
-    return entry.run(checked(image, scene), scene, Beside(oracle, knowns, unlit, noise))
+    outcome = entry.run(checked(image, scene), scene, Beside(oracle, knowns, unlit, noise))
+    return with_distance(outcome, scene, knowns or Knowns())

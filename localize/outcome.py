@@ -22,6 +22,20 @@ NO_ELLIPSE: Final = "no ellipse fits the outline"
 NEAR_CIRCLE: Final = "near-circle: the outline does not tell where the cone leans"
 
 
+@dataclass(frozen=True)
+class Distance:
+    """How far the tip is from the wall [mm]: along the needle's axis, and from its nearest point; negative behind it.
+
+    The standard deviations [mm] hold the pose's, its correlation with what else the fit left free, and how well the
+    wall is known; None where the localizer states no covariance. Research, no safety device.
+    """
+
+    along_mm: float
+    nearest_mm: float
+    sigma_along_mm: float | None = None
+    sigma_nearest_mm: float | None = None
+
+
 @dataclass(frozen=True, eq=False)
 class Localization:
     """Where the tip is and where the needle points; truthy.
@@ -30,7 +44,7 @@ class Localization:
     localizer knows it, is `[5, 5]` over the apex [mm] and the axis's components [rad] along the first two columns
     of `Pose.rotation()`, or `[6, 6]` with the roll [rad] behind them. `spread_mm` is the root mean square distance
     of several spotlights' positions from their mean, None where there was one estimate. `roll` [rad] is as in `Pose`,
-    None for localizers that do not measure it.
+    None for localizers that do not measure it. `distance` is the tip's from the wall, which `locate` adds.
     """
 
     apex_mm: Array
@@ -38,6 +52,7 @@ class Localization:
     covariance: Array | None = None
     spread_mm: float | None = None
     roll: float | None = None
+    distance: Distance | None = None
 
 
 @dataclass(frozen=True)

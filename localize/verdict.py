@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from conespot.localize.distance import distance_of
 from conespot.localize.model.estimate import Estimate
 from conespot.localize.model.knowns import Knowns
 from conespot.localize.model.prior import rcm_miss
@@ -71,9 +72,10 @@ def judged(
     if float(inwards @ estimate.pose.axis) <= 0.0:
         return LocalizationFailure(BEHIND)
     size = estimate.pose_size
-    pose = covariance[:size, :size].copy()
-    pose[np.arange(3), np.arange(3)] += VERDICT.floor_mm**2
-    pose[np.arange(3, size), np.arange(3, size)] += VERDICT.floor_rad**2
+    joint = covariance.copy()
+    joint[np.arange(3), np.arange(3)] += VERDICT.floor_mm**2
+    joint[np.arange(3, size), np.arange(3, size)] += VERDICT.floor_rad**2
+    pose = joint[:size, :size].copy()
     sigma = math.sqrt(float(np.trace(pose[:3, :3])))
     limit = VERDICT.largest_free_sigma_mm if knowns.rcm_sigma_mm is None else VERDICT.largest_sigma_mm
     if not math.isfinite(sigma) or sigma > limit:
@@ -87,9 +89,10 @@ def judged(
         return LocalizationFailure(MISFIT)
     if not settled:
         return LocalizationFailure(UNSETTLED)
+    distance = distance_of(estimate, joint, knowns, joint=True)
     if size == 6:
         # a pose's roll turns about the needle's back end, the fit's about the axis into the light
         pose[5, :5] *= -1.0
         pose[:5, 5] *= -1.0
-        return Localization(estimate.pose.apex, estimate.pose.axis, pose, roll=estimate.pose.roll)
-    return Localization(estimate.pose.apex, estimate.pose.axis, pose)
+        return Localization(estimate.pose.apex, estimate.pose.axis, pose, roll=estimate.pose.roll, distance=distance)
+    return Localization(estimate.pose.apex, estimate.pose.axis, pose, distance=distance)

@@ -19,6 +19,8 @@ _XYZ = ("x", "y", "z")
 TRUE_TIP = tuple(f"true_{axis}_mm" for axis in _XYZ)
 TIP = tuple(f"est_{axis}_mm" for axis in _XYZ)
 TIP_ERROR = tuple(f"error_{axis}_mm" for axis in _XYZ)
+#: how far a tip is from the wall, two ways
+DISTANCE = ("nearest", "along")
 TIP_SIGMA = tuple(f"est_sigma_{axis}_mm" for axis in _XYZ)
 
 
@@ -53,6 +55,11 @@ def _stated(name: str, unit: str, meaning: str, least: float = -math.inf, most: 
     return Column(name, "stated", "number", meaning, unit, least, most, optional=True)
 
 
+def _distances(name: str, meaning: str, *, least: float) -> tuple[Column, ...]:
+    words = {"nearest": "to the wall's nearest point", "along": "to the wall along the needle's axis"}
+    return tuple(_stated(name.format(way), "mm", meaning.format(words[way]), least) for way in DISTANCE)
+
+
 COLUMNS = (
     Column("case", "identity", "text", "key of the case, as in cases.jsonl"),
     Column("frame", "identity", "text", "cases with the same one look at the same images", optional=True),
@@ -81,6 +88,10 @@ COLUMNS = (
     _stated("est_sigma_axis_deg", "deg", "standard deviation of the axis", 0.0),
     _stated("est_sigma_roll_deg", "deg", "standard deviation of the roll", 0.0),
     _stated("est_roll_error_deg", "deg", "found minus true roll"),
+    *_distances("true_{}_mm", "distance of the true tip {}", least=-math.inf),
+    *_distances("est_{}_mm", "distance of the found tip {}", least=-math.inf),
+    *_distances("est_sigma_{}_mm", "standard deviation of the distance {}", least=0.0),
+    *_distances("est_error_{}_mm", "found minus true distance {}", least=-math.inf),
     _stated("est_bound_mm", "mm", "root mean square tip error that no unbiased localizer beats", 0.0),
 )
 _BY_NAME = {column.name: column for column in COLUMNS}
