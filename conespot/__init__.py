@@ -15,6 +15,7 @@ if TYPE_CHECKING:
     from conespot.localize.model.noise import SensorNoise
     from conespot.localize.outcome import Localization, LocalizationFailure
     from conespot.localize.sequence import locate_sequence
+    from conespot.localize.together import locate_together
     from conespot.render.exposure import Exposure
     from conespot.render.renderer import Renderer
     from conespot.results.run import load_run
@@ -39,6 +40,7 @@ _HOMES = {
     "load_scene": "scene.scene",
     "locate": "localize.locate",
     "locate_sequence": "localize.sequence",
+    "locate_together": "localize.together",
     "run_campaign": "campaigns.session",
 }
 
@@ -58,6 +60,7 @@ __all__ = [
     "load_scene",
     "locate",
     "locate_sequence",
+    "locate_together",
     "run_campaign",
 ]
 
