@@ -34,6 +34,7 @@ def parser() -> argparse.ArgumentParser:
     _add_campaigns(add)
     _add_runs(add)
     _add_results(add)
+    _add_own(add)
     doctor = add(subcommands.doctor, "say what this machine renders with, and prove it")
     doctor.add_argument("--clear-cache", action="store_true", help="remove the backgrounds kept between runs instead")
     return line
@@ -92,6 +93,23 @@ def _add_runs(add: _Add) -> None:
     retry.add_argument("--log", metavar="FILE", type=Path, help="as for run")
     report = add(subcommands.report, "make the tables, figures and report of a run folder again")
     report.add_argument("folder", type=Path, metavar="RUN")
+
+
+def _add_own(add: _Add) -> None:
+    """What takes frames of one's own camera."""
+    localize = add(subcommands.localize, "find the needle in images, folders and videos of your own microscope")
+    localize.add_argument("frames", type=Path, nargs="+", metavar="FRAMES", help="images, folders of images, videos")
+    localize.add_argument("--scene", required=True, help="the YAML file that describes the microscope, or a preset")
+    localize.add_argument("--localizer", default="cone", metavar="NAME", help="what finds the needle (default: cone)")
+    localize.add_argument("--reference", type=Path, nargs="+", metavar="FRAMES", help="frames without spotlights")
+    localize.add_argument("--csv", type=Path, metavar="FILE", help="write a row for each frame")
+    localize.add_argument("--json", type=Path, metavar="FILE", help="write the same with covariances")
+    localize.add_argument("--overlay", type=Path, metavar="FOLDER", help="draw what was seen in each frame")
+    alarm = "say which tips are safe: farther from the wall than this, such as '0.1 mm' (research, no safety device)"
+    localize.add_argument("--alarm", metavar="DISTANCE", help=alarm)
+    chance = "chance that a tip called safe is not, by the stated sigma (default: 0.001)"
+    localize.add_argument("--false-safe", type=float, default=1e-3, metavar="P", help=chance)
+    add_set(localize)
 
 
 def _add_results(add: _Add) -> None:

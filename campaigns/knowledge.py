@@ -57,6 +57,7 @@ class Knowledge(Model):
     camera_height_error: Length = Field(0.0, ge=0.0)
     camera_height_sigma: LengthSigma = 0.0
     semi_axes_sigma: LengthSigma = 0.0
+    relief_sigma: Length = Field(0.0, ge=0.0)
     surface: AnySurface | None = None
     reference: int = Field(0, ge=0, le=1000, strict=True)
     sequence: int = Field(0, ge=0, le=1000, strict=True)
@@ -79,6 +80,7 @@ class Knowledge(Model):
             eye_radius_sigma_mm=self.eye_radius_sigma,
             camera_height_sigma_mm=self.camera_height_sigma,
             semi_axes_sigma_mm=self.semi_axes_sigma,
+            relief_sigma_mm=self.relief_sigma,
         )
 
     def told(self, scene: Scene, rng: np.random.Generator) -> Scene:

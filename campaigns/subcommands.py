@@ -146,6 +146,20 @@ def debug(options: argparse.Namespace) -> Ending:
     return Ending.DONE
 
 
+def localize(options: argparse.Namespace) -> Ending:
+    """Localize frames of one's own camera."""
+    from conespot.campaigns.own_frames import Count, OwnFrames, localize, make_alarm, outputs
+
+    own, count = OwnFrames(options.scene, options.set, options.localizer), Count()
+    alarm = make_alarm(options.alarm, options.false_safe)
+    if options.reference:
+        own.learn(options.reference)
+    beside = outputs(own, alarm, csv=options.csv, json=options.json, overlay=options.overlay)
+    for line in localize(own, options.frames, alarm, beside, count):
+        _say(line)
+    return _fail(count.sentence, Ending.FAILED) if count.sentence else Ending.DONE
+
+
 def list(options: argparse.Namespace) -> Ending:
     """List campaigns, or localizers."""
     if options.localizers:

@@ -5,23 +5,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 from pathlib import Path
 
-from conespot.campaigns.schema import override, setting
-from conespot.scene import InputError, Scene
-from conespot.scene.document import Document, find_document, read_document
-from conespot.scene.scene import read_scene
-
-
-def described_scene(name: str, settings: Sequence[str]) -> Scene:
-    """The scene of a preset or file with `scene.KEY=VALUE` settings on it. Raises InputError."""
-    document = read_document(find_document(name, "scene", "presets", "scene preset"))
-    lines = {("scene", *path): line for path, line in document.lines.items()}
-    document = Document(document.source, {"scene": document.data}, lines, document.folder)
-    for text in settings:
-        key, value = setting(text)
-        if not key.startswith("scene."):
-            raise InputError(f"--set {key}: the theory is about a scene alone; set a key such as scene.eye.radius")
-        document = override(document, key, value, f"--set {key}")
-    return read_scene(document, at=("scene",))
+from conespot.campaigns.own_scene import described_scene
+from conespot.scene import InputError
 
 
 def write_theory_of(name: str, settings: Sequence[str], out: str | None) -> tuple[Path, str]:
@@ -29,7 +14,7 @@ def write_theory_of(name: str, settings: Sequence[str], out: str | None) -> tupl
     from conespot.localize.theory.assessment import assess
     from conespot.results.theory_tables import write_theory_tables
 
-    scene = described_scene(name, settings)
+    scene, _ = described_scene(name, settings, "the theory")
     folder = Path(out or Path("runs") / f"theory-{Path(name).stem}")
     if folder.is_file():
         raise InputError(f"{folder}: is a file, not a folder; choose another --out")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -21,6 +22,7 @@ _POINTS = 256  # of an outline
 _BINS = 256  # of a window, at most
 _MARGIN = 0.25  # around a patch
 _FEWEST = 10  # bins that tell two levels
+_EDGES = 128  # places along an outline where the light's edge is looked for
 _ROUNDS = 10  # until it is settled which clipped bins are bright enough
 
 
@@ -45,13 +47,15 @@ class Account:
 
     `mask` `[H, W]` is what it took for light and `found` the outlines `[N, 2]` it cut out, of those that threshold.
     `fitted` are the outlines `[N, 2]` of what it fitted: ellipses (drawn as the cones over them, which is the same to a
-    micrometre, paper, Table I) or the cones of its answer. `patches` are predicted from the answer, none without one.
+    micrometre, paper, Table I) or the cones of its answer. `patches` are predicted from the answer, none without one;
+    `edges` are where their light itself falls to the level that the answer predicts at its outline `[N, 2]`.
     """
 
     mask: NDArray[np.bool_] | None = None
     found: tuple[Array, ...] = ()
     fitted: tuple[Array, ...] = ()
     patches: tuple[Patch, ...] = ()
+    edges: tuple[Array, ...] = ()
 
 
 def account(image: AnyImage, scene: Scene, localizer: str, outcome: Outcome) -> Account:
@@ -62,16 +66,17 @@ def account(image: AnyImage, scene: Scene, localizer: str, outcome: Outcome) -> 
         estimate = Estimate(Pose(outcome.apex_mm, outcome.axis, outcome.roll or 0.0), scene)
         fitted = tuple(outline(estimate, k, _POINTS) for k in range(len(scene.spotlights)))
         patches = _patches(Frame(image, scene.sensor), estimate)
+    edges = tuple(_edge(patch) for patch in patches)
     method = METHODS.get(localizer)
     if method is None:
-        return Account(fitted=fitted, patches=patches)
+        return Account(fitted=fitted, patches=patches, edges=edges)
     steps = method.steps(image, scene)
     mask = np.zeros(scene.camera.shape, bool)
     height, width = steps.mask.bright.shape
     mask[steps.mask.top : steps.mask.top + height, steps.mask.left : steps.mask.left + width] = steps.mask.bright
     fitted = tuple(_drawn(pair.apexes[0], pair.axes[0], scene) for pair in steps.pairs)
     found = tuple(np.asarray(points + 0.5, np.float64) for points in steps.outlines)
-    return Account(mask, found, fitted, patches)
+    return Account(mask, found, fitted, patches, edges)
 
 
 def _drawn(apex: Array, axis: Array, scene: Scene) -> Array:
@@ -103,3 +108,57 @@ def _patch(frame: Frame, estimate: Estimate, spotlight: int, at: Window) -> Patc
         # a clipped bin is a lower bound, which light above it meets
         use = seen & ~(clipped & (predicted > light))
     return Patch(at.row, at.column, at.side, shown.signal, np.minimum(predicted, 1.0).reshape(shown.signal.shape))
+
+
+def _edge(patch: Patch) -> Array:
+    """Where a patch's light crosses the predicted light's middle level, as seen from its middle `[N, 2]` [px].
+
+    On each line outwards, seen light is first brought to the predicted light's own two levels by least squares, since
+    a real retina is not even.
+    """
+    height, width = patch.light.shape
+    low, high = float(np.nanmin(patch.predicted)), float(np.nanmax(patch.predicted))
+    level = (low + high) / 2.0
+    lit = patch.predicted > level
+    if not lit.any() or high <= low:
+        return np.empty((0, 2))
+    rows, columns = np.nonzero(lit)
+    middle = np.array([columns.mean(), rows.mean()])
+    reach = np.arange(0.0, math.hypot(height, width), 0.5)
+    found = []
+    for turn in np.linspace(0.0, 2.0 * np.pi, _EDGES, endpoint=False):
+        x, y = middle[:, None] + np.array([[math.cos(turn)], [math.sin(turn)]]) * reach
+        inside = (x >= 0.0) & (x <= width - 1.0) & (y >= 0.0) & (y <= height - 1.0)
+        at = [y[inside], x[inside]]
+        predicted, seen = (_along(plane, at) for plane in (patch.predicted, patch.light))
+        crossing = _falls_below(predicted, level)
+        if crossing is None or np.ptp(predicted) < (high - low) / 2.0:
+            continue
+        levels = np.column_stack([predicted, np.ones(len(predicted))])
+        gain, offset = np.linalg.lstsq(levels, seen, rcond=None)[0]
+        if not gain > 0.0:
+            continue
+        own = _falls_below((seen - offset) / gain, level, near=crossing)
+        if own is not None:
+            found.append(patch.side * (middle + 0.5 * own * np.array([math.cos(turn), math.sin(turn)]) + 0.5))
+    corner = np.array([patch.column, patch.row], float)
+    return np.array(found).reshape(-1, 2) + corner
+
+
+def _along(plane: Array, at: list[Array]) -> Array:
+    """Bilinear values of a plane at rows and columns `[N]` each."""
+    row, column = (np.floor(part).astype(int) for part in at)
+    down, right = at[0] - row, at[1] - column
+    below, beside = np.minimum(row + 1, plane.shape[0] - 1), np.minimum(column + 1, plane.shape[1] - 1)
+    upper = plane[row, column] * (1.0 - right) + plane[row, beside] * right
+    lower = plane[below, column] * (1.0 - right) + plane[below, beside] * right
+    return np.asarray(upper * (1.0 - down) + lower * down)
+
+
+def _falls_below(profile: Array, level: float, near: float | None = None) -> float | None:
+    """Where a profile `[N]` falls below a level, in steps from its start: the first place, or that nearest another."""
+    steps = np.flatnonzero((profile[:-1] >= level) & (profile[1:] < level))
+    if not len(steps):
+        return None
+    places = steps + (profile[steps] - level) / (profile[steps] - profile[steps + 1])
+    return float(places[0] if near is None else places[np.argmin(np.abs(places - near))])

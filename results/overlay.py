@@ -9,7 +9,7 @@ import io
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -44,11 +44,21 @@ class Residual:
 
 
 @dataclass(frozen=True, eq=False)
+class Mark:
+    """Points `[N, 2]` [px] that are drawn over a frame as one thing, in a colour of `COLOURS`, named in the legend."""
+
+    name: str
+    points: Array
+    colour: str
+    how: Literal["line", "closed", "dots"] = "line"
+
+
+@dataclass(frozen=True, eq=False)
 class Overlay:
     """A frame `[H, W]` or `[H, W, 3]` (RGB), in which `white` is the largest value, and what was seen in it.
 
     `lines` are outlines `[N, 2]` [px] (column, row; pixel centres at i + 0.5) by what they are, a key of `LINES`;
-    `mask` `[H, W]` is what was taken for light.
+    `marks` are drawn above them. `mask` `[H, W]` is what was taken for light.
     """
 
     image: NDArray[Any]
@@ -56,6 +66,7 @@ class Overlay:
     lines: Mapping[str, Sequence[Array]] = field(default_factory=dict)
     mask: NDArray[np.bool_] | None = None
     residuals: Sequence[Residual] = ()
+    marks: Sequence[Mark] = ()
 
 
 def draw_overlay(overlay: Overlay, title: str, caption: str, path: Path) -> Path:
@@ -89,9 +100,12 @@ def _whole(axes: Axes, overlay: Overlay) -> None:
 def _near(axes: Axes, overlay: Overlay) -> None:
     _show(axes, overlay, _box(overlay))
     axes.set_title("outlines", loc="left")
+    left, top, right, bottom = _box(overlay)
     _draw_lines(axes, overlay)
-    if overlay.lines:
-        axes.legend(loc="upper right", labelcolor="white")
+    axes.set_xlim(left, right)  # a needle may lead out of what is shown
+    axes.set_ylim(bottom, top)
+    if axes.get_legend_handles_labels()[1]:
+        axes.legend(loc="upper right", labelcolor="white", frameon=True, facecolor="black", framealpha=0.6)
 
 
 def _masked(axes: Axes, overlay: Overlay) -> None:
@@ -122,6 +136,11 @@ def _draw_lines(axes: Axes, overlay: Overlay) -> None:
         for number, points in enumerate(overlay.lines.get(what, ())):
             closed = np.concatenate([points, points[:1]])
             axes.plot(*closed.T, color=colour, linestyle=line, linewidth=1.0, label=None if number else what)
+    for mark in overlay.marks:
+        points = np.concatenate([mark.points, mark.points[:1]]) if mark.how == "closed" else mark.points
+        line, dot = ("none", ".") if mark.how == "dots" else ("-", "none")
+        colour = COLOURS[mark.colour]
+        axes.plot(*points.T, color=colour, linestyle=line, marker=dot, markersize=2.5, linewidth=1.0, label=mark.name)
 
 
 def _show(axes: Axes, overlay: Overlay, box: tuple[int, int, int, int]) -> None:
@@ -135,6 +154,7 @@ def _box(overlay: Overlay) -> tuple[int, int, int, int]:
     """Left, top, right, bottom [px] of what is drawn, with a margin; the whole frame where nothing is."""
     height, width = overlay.image.shape[:2]
     drawn = [points for lines in overlay.lines.values() for points in lines if len(points)]
+    drawn += [mark.points for mark in overlay.marks if len(mark.points) == 1]  # the tip; a shaft leads far away
     if not drawn:
         return 0, 0, width, height
     points = np.concatenate(drawn)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import functools
 import math
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -30,6 +31,8 @@ from conespot.scene.storage import Storage
 from conespot.scene.surface import AnySurface, Surface
 from conespot.scene.text_file import at_home
 
+#: the key of a scene's file that says how well its quantities are known
+KNOWLEDGE = "knowledge"
 #: by which a scene's retina may differ from that of the model eye that the camera looks into [mm]
 _SAME_RETINA = 0.01
 
@@ -245,7 +248,13 @@ def expand(document: Document, at: tuple[str | int, ...]) -> Document:
 @functools.lru_cache(maxsize=16)
 def _read_preset(path: Path, changed: int) -> Document:
     """The document as it was at that time; a sweep lays each of its combinations on the same one."""
-    return read_document(path)
+    return without_knowledge(read_document(path))
+
+
+def without_knowledge(document: Document) -> Document:
+    """A scene's document without how well its quantities are known (`knowledge:`), which is for who localizes."""
+    data = {key: value for key, value in document.data.items() if key != KNOWLEDGE}
+    return replace(document, data=data)
 
 
 def merge_at(data: dict[str, Any], new: dict[str, Any], at: tuple[str | int, ...]) -> dict[str, Any]:
@@ -258,4 +267,4 @@ def merge_at(data: dict[str, Any], new: dict[str, Any], at: tuple[str | int, ...
 
 def load_scene(name: str | Path) -> Scene:
     """A scene by preset name (`paper`, `paper-code`) or from a YAML file. Raises InputError."""
-    return read_scene(read_document(find_document(str(name), "scene", "presets", "scene preset")))
+    return read_scene(without_knowledge(read_document(find_document(str(name), "scene", "presets", "scene preset"))))

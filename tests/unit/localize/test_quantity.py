@@ -11,8 +11,11 @@ from conespot.scene.document import InputError
 from conespot.scene.scene import Scene
 
 
-def test_every_quantity_has_its_sigma_and_every_sigma_but_the_rcms_its_quantity():
-    assert {each.known for each in QUANTITIES} == {field.name for field in fields(Knowns)} - {"rcm_sigma_mm"}
+def test_every_quantity_has_its_sigma_and_every_sigma_but_the_rcms_and_the_reliefs_its_quantity():
+    assert {each.known for each in QUANTITIES} == {field.name for field in fields(Knowns)} - {
+        "rcm_sigma_mm",
+        "relief_sigma_mm",
+    }
     for each in QUANTITIES:
         assert Knowns(**{each.known: None}).sigma(each) is None
         assert Knowns(**{each.known: 0.5}).sigma(each) == 0.5 * each.per_unit

@@ -1,0 +1,103 @@
+"""`campaign localize`: the needle in frames of one's own camera."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from conespot.campaigns.answers import Answer, CsvOutput, JsonOutput, Output, OverlayOutput, Table
+from conespot.campaigns.own_scene import described_scene
+from conespot.localize.distance import Alarm
+from conespot.localize.frames.reader import read_frames
+from conespot.localize.image import Reference
+from conespot.localize.locate import LOCALIZERS, find_localizer, locate
+from conespot.localize.model.knowns import Knowns
+from conespot.scene import InputError
+from conespot.scene.quantity import parse_quantity
+
+
+@dataclass
+class Count:
+    """Frames, and how many of them were refused for which reason."""
+
+    frames: int = 0
+    refused: Counter[str] = field(default_factory=Counter)
+
+    @property
+    def sentence(self) -> str:
+        """Why some were refused; empty if none was."""
+        total = sum(self.refused.values())
+        reasons = "; ".join(f"{number} x {reason}" for reason, number in self.refused.most_common(5))
+        return f"{total} of {self.frames} frames refused: {reasons}" if total else ""
+
+
+class OwnFrames:
+    """Localizes frames from outside, one after the other, with what their scene says.
+
+    Raises InputError, before any frame is looked at, for a scene or a localizer that cannot be used.
+    """
+
+    def __init__(self, name: str, settings: Sequence[str], localizer: str) -> None:
+        self.scene, knowledge = described_scene(name, settings, "localize")
+        entry = find_localizer(localizer)
+        if entry.needs_truth:
+            others = ", ".join(name for name, known in LOCALIZERS.items() if not known.needs_truth)
+            raise InputError(f"localizer '{localizer}' needs the true pose, which your own frames lack; take {others}")
+        self.localizer = localizer
+        self._knowns: Knowns | None = knowledge.knowns if entry.takes_knowledge else None
+        self._reference: Reference | None = None
+
+    def learn(self, unlit: Sequence[Path]) -> None:
+        """Take frames without spotlights, averaged, as the view of the retina. Raises InputError."""
+        if self._knowns is None:
+            raise InputError(f"--reference: localizer '{self.localizer}' has no use for it; leave it out")
+        self._reference = Reference.mean((frame.image for frame in read_frames(unlit, self.scene)), self.scene)
+
+    def answers(self, sources: Sequence[Path], alarm: Alarm | None) -> Iterator[Answer]:
+        """An answer for every frame. Raises InputError where it gets to one that does not fit the scene."""
+        for frame in read_frames(sources, self.scene):
+            outcome = locate(frame.image, self.scene, self.localizer, knowns=self._knowns, reference=self._reference)
+            yield Answer.of(frame, outcome, alarm)
+
+
+def make_alarm(distance: str | None, false_safe: float) -> Alarm | None:
+    """The alarm of two options; None without one. Raises InputError."""
+    if distance is None:
+        return None
+    try:
+        return Alarm(parse_quantity(distance, "length", bare=False), false_safe)
+    except ValueError as error:
+        raise InputError(f"--alarm: {error}") from None
+
+
+def outputs(
+    own: OwnFrames, alarm: Alarm | None, *, csv: Path | None, json: Path | None, overlay: Path | None
+) -> list[Output]:
+    """What the options ask for beside the table. Raises InputError for what could not be written."""
+    found: list[Output] = []
+    if csv is not None:
+        found.append(CsvOutput(csv))
+    if json is not None:
+        found.append(JsonOutput(json, own.scene, own.localizer, alarm))
+    if overlay is not None:
+        found.append(OverlayOutput(overlay, own.scene, own.localizer))
+    return found
+
+
+def localize(
+    own: OwnFrames, sources: Sequence[Path], alarm: Alarm | None, beside: Sequence[Output], count: Count
+) -> Iterator[str]:
+    """The lines of the table for people, as the frames come; `count` is counted up, and the outputs are written."""
+    table = Table(alarm)
+    yield from table.head()
+    for answer in own.answers(sources, alarm):
+        count.frames += 1
+        if not answer.outcome:
+            count.refused[str(getattr(answer.outcome, "reason", ""))] += 1
+        for output in beside:
+            output.add(answer)
+        yield table.line(answer)
+    for output in beside:
+        output.close()

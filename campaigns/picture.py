@@ -1,0 +1,67 @@
+"""A picture by which a person judges an answer: the frame, outline predicted, edge seen, tip, axis and ellipsoid."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+
+from conespot.campaigns.answers import RESEARCH, Answer
+from conespot.localize.account import account
+from conespot.localize.image import white_level
+from conespot.localize.needle import Needle
+from conespot.localize.outcome import Localization
+from conespot.results.overlay import Mark, Overlay, Residual, draw_overlay
+from conespot.scene.scene import Scene
+
+#: the ellipsoid is drawn at least so large [px] a pixel of the frame's width, by a factor that stands beside it
+_SHOWN = 0.004
+
+
+def draw_answer(answer: Answer, scene: Scene, localizer: str, path: Path) -> None:
+    """Write the picture of an answer as PNG. Raises InputError if it cannot be written."""
+    image, found = answer.frame.image, answer.outcome
+    saw = account(image, scene, localizer, found)
+    lines = {"found": saw.found, "fitted": saw.fitted}
+    marks = [Mark("edge seen", edge, "about Z", "dots") for edge in saw.edges if len(edge)]
+    said, distance = "refused", ""
+    if isinstance(found, Localization):
+        marks += _needle(Needle.of(found, scene), scene.camera.shape[1])
+        said = f"tip {' '.join(f'{value:.4f}' for value in found.apex_mm)} mm"
+        distance = _distance(found)
+    else:
+        said = f"refused: {found.reason}"
+    white = 1.0 if image.dtype.kind == "f" else float(white_level(image, scene))
+    residuals = [Residual(p.row, p.column, p.side, p.light - p.predicted) for p in saw.patches]
+    safe = {None: "", True: " Safe.", False: " NOT SAFE."}[answer.safe]
+    draw_overlay(
+        Overlay(image, white, lines, saw.mask, residuals, marks),
+        f"{localizer}, {Path(answer.frame.name).name}: {said}",
+        f"{distance}{safe} {RESEARCH} Residual: over an even retina.",
+        path,
+    )
+
+
+def _needle(needle: Needle, columns: int) -> list[Mark]:
+    marks = [
+        Mark("needle", needle.shaft, "single"),
+        Mark("axis to the wall", needle.beam, "about Y"),
+        Mark("nearest wall", needle.nearest, "paper"),
+        Mark("tip", needle.tip, "failed", "dots"),
+    ]
+    if needle.ellipsoid is not None:
+        spread = needle.ellipsoid - needle.tip
+        size, factor = float(np.max(np.abs(spread))), 1
+        while 0.0 < size * factor < _SHOWN * columns and factor < 10_000:
+            factor *= 10
+        name = "95 % ellipsoid" + (f" x {factor}" if factor > 1 else "")
+        marks.append(Mark(name, needle.tip + factor * spread, "failed", "closed"))
+    return [mark for mark in marks if len(mark.points)]
+
+
+def _distance(found: Localization) -> str:
+    if found.distance is None:
+        return ""
+    sigma = found.distance.sigma_nearest_mm
+    known = "" if sigma is None else f" +- {sigma:.4f}"
+    return f"{found.distance.nearest_mm:.4f}{known} mm from the wall, {found.distance.along_mm:.4f} mm along the axis."

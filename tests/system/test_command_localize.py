@@ -1,0 +1,118 @@
+"""`campaign localize`: own images to a table, files and pictures; refusals counted; distances with an alarm."""
+
+import csv
+import json
+import math
+
+import cv2
+import numpy as np
+import pytest
+from photographs import photograph, scene_of
+
+from conespot import load_scene
+from conespot.campaigns.command import main
+from conespot.scene.beam import HardBeam
+
+TIPS = [(0.6, -0.4, 3.0), (-1.2, 0.8, 2.0)]
+MY_YAML = """\
+preset: paper
+camera: {resolution: 400}
+beam: {kind: hard, half_angle: 9 deg}
+sensor: {kind: linear, white: 1 W/m2/sr}
+knowledge: {rcm_sigma: 0.02 mm}
+"""
+
+
+@pytest.fixture(scope="module")
+def own(tmp_path_factory):
+    """A folder with the description of a microscope, two frames of it, and an empty one."""
+    folder = tmp_path_factory.mktemp("own")
+    (folder / "my.yaml").write_text(MY_YAML)
+    scene = scene_of(HardBeam(), resolution=400)
+    (folder / "frames").mkdir()
+    for number, tip in enumerate(TIPS):
+        image = photograph(scene, scene.pose(np.array(tip)), seed=number)
+        cv2.imwrite(str(folder / "frames" / f"frame_{number}.png"), image)
+    cv2.imwrite(str(folder / "dark.png"), np.random.default_rng(1).integers(0, 9, (400, 400), np.uint16))
+    return folder
+
+
+def localize(own, *arguments):
+    return main(["localize", *map(str, arguments), "--scene", str(own / "my.yaml")])
+
+
+def test_a_folder_of_frames_is_a_table_and_files_that_agree_with_it(own, tmp_path, capsys):
+    files = ["--csv", tmp_path / "x.csv", "--json", tmp_path / "x.json", "--overlay", tmp_path / "seen"]
+    assert localize(own, own / "frames", *files, "--alarm", "0.1 mm") == 0
+    said = capsys.readouterr()
+    assert "Research, no safety device." in said.out
+    assert [line.rpartition(" ")[2] for line in said.out.splitlines()[2:]] == ["safe", "safe"]
+    with open(tmp_path / "x.csv") as table:
+        rows = list(csv.DictReader(table))
+    for row, tip in zip(rows, TIPS, strict=True):
+        found = np.array([float(row[key]) for key in ("x_mm", "y_mm", "z_mm")])
+        assert np.linalg.norm(found - tip) < 0.02
+        wall = 12.0 - np.linalg.norm(np.array(tip) - [0.0, 0.0, 12.0])
+        assert abs(float(row["nearest_mm"]) - wall) < 5.0 * float(row["sigma_nearest_mm"])
+        assert row["safe"] == "yes"
+    told = json.loads((tmp_path / "x.json").read_text())
+    assert [one["x_mm"] for one in told["frames"]] == [float(row["x_mm"]) for row in rows]
+    assert np.array(told["frames"][0]["covariance"]).shape == (5, 5)
+    pictures = [cv2.imread(str(path)) for path in sorted((tmp_path / "seen").glob("*.png"))]
+    assert len(pictures) == 2
+    assert all(picture.std() > 10 for picture in pictures)
+
+
+def test_a_refused_frame_has_its_reason_is_not_safe_and_makes_the_exit_code_1(own, tmp_path, capsys):
+    arguments = [own / "frames" / "frame_0.png", own / "dark.png", "--alarm", "0.1 mm", "--csv", tmp_path / "x.csv"]
+    assert localize(own, *arguments) == 1
+    said = capsys.readouterr()
+    assert "dark.png" in said.out
+    assert "NOT SAFE" in said.out.splitlines()[-1]
+    assert "1 of 2 frames refused: 1 x " in said.err
+    with open(tmp_path / "x.csv") as table:
+        rows = list(csv.DictReader(table))
+    assert [(row["status"], row["safe"]) for row in rows] == [("localized", "yes"), ("refused", "no")]
+    assert rows[1]["reason"]
+    assert rows[1]["x_mm"] == ""
+
+
+def test_a_frame_that_does_not_fit_is_one_sentence_and_nothing_is_written(own, tmp_path, capsys):
+    cv2.imwrite(str(tmp_path / "eight.png"), np.zeros((400, 400), np.uint8))
+    assert localize(own, own / "frames", tmp_path / "eight.png", "--csv", tmp_path / "x.csv") == 2
+    error = capsys.readouterr().err.splitlines()
+    assert len(error) == 1
+    assert "eight.png: has 8 bits a pixel, but scene.sensor has 12" in error[0]
+    assert not (tmp_path / "x.csv").exists()
+
+
+@pytest.mark.parametrize(
+    ("arguments", "said"),
+    [
+        (["--localizer", "paper-code-oracle"], "needs the true pose, which your own frames lack"),
+        (["--localizer", "con"], "did you mean 'cone'?"),
+        (["--alarm", "0.1"], "--alarm: "),
+        (["--alarm", "0.1 mm", "--false-safe", "0.9"], "must lie between 0 and 0.5"),
+        (["--csv", "no/such/x.csv"], "its folder does not exist; choose another --csv"),
+        (["--set", "poses=3"], "--set poses: localize is about a scene alone"),
+        (["--set", "knowledge.rcm_error=1 mm"], "knowledge.rcm_error: belongs to a campaign"),
+        (["--localizer", "paper", "--reference", "frames"], "--reference: localizer 'paper' has no use for it"),
+    ],
+)
+def test_bad_options_are_one_sentence_before_any_frame_is_looked_at(own, capsys, arguments, said):
+    assert localize(own, own / "frames", *arguments) == 2
+    error = capsys.readouterr().err
+    assert said in error
+    assert len(error.splitlines()) == 1
+
+
+def test_a_scenes_own_word_on_how_well_it_is_known_is_told_to_the_localizer(own, tmp_path):
+    def sigma(*settings):
+        localize(own, own / "frames" / "frame_0.png", "--csv", tmp_path / "x.csv", *settings)
+        with open(tmp_path / "x.csv") as table:
+            return float(next(csv.DictReader(table))["sigma_nearest_mm"])
+
+    sure = sigma()
+    unsure = sigma("--set", "knowledge.relief_sigma=0.05 mm")
+    assert unsure == pytest.approx(math.hypot(sure, 0.05), rel=1e-6)
+    assert load_scene(own / "my.yaml").camera.resolution == 400  # whoever wants the scene alone may read it too
