@@ -8,7 +8,7 @@ from pathlib import Path
 
 from conespot.campaigns import subcommands
 from conespot.campaigns.ending import Ending
-from conespot.campaigns.machines import add_machines
+from conespot.campaigns.machines import add_machines, add_workers
 from conespot.campaigns.new_campaign import QUESTIONS
 from conespot.campaigns.questions import add_questions
 from conespot.campaigns.settings import add_set, add_settings
@@ -73,6 +73,12 @@ def _add_campaigns(add: _Add) -> None:
     add(subcommands.show, "print a campaign's file").add_argument("campaign")
 
 
+def _count(text: str) -> int:
+    if not (text.isascii() and text.isdecimal() and len(text) < 19):
+        raise argparse.ArgumentTypeError("must be a whole number, 0 or more")
+    return int(text)
+
+
 def _text(text: str) -> str:
     if not text.strip():
         raise argparse.ArgumentTypeError("is empty, which every reason holds")
@@ -113,7 +119,17 @@ def _add_own(add: _Add) -> None:
 
 
 def _add_results(add: _Add) -> None:
-    """What compares, or looks into, what was found."""
+    """What compares, looks into or hands on what was found."""
+    pack = add(subcommands.pack, "make one archive of a run, with checksums, that others can check and go on with")
+    pack.add_argument("folder", type=Path, metavar="RUN")
+    pack.add_argument("--out", type=Path, metavar="FILE", help="the archive (default: RUN.zip)")
+    verify = add(subcommands.verify, "check an archive: checksums, rows, and a random sample of its poses once more")
+    verify.add_argument("archive", type=Path, metavar="ARCHIVE")
+    verify.add_argument("--sample", type=_count, default=10, metavar="N", help="poses to measure again (default: 10)")
+    verify.add_argument(
+        "--seed", type=_count, metavar="N", help="draw the same sample again (default: another each time)"
+    )
+    add_workers(verify)
     merge = add(subcommands.merge, "make one run folder of those of a campaign's shards")
     merge.add_argument("out", type=Path, metavar="OUT")
     merge.add_argument("folders", type=Path, nargs="+", metavar="SHARD")

@@ -17,9 +17,14 @@ _MOST_WORKERS = 1024
 def add_machines(command: argparse.ArgumentParser) -> None:
     """Let a command have `--workers`, or `--scheduler` or `--profile` in their place."""
     where = command.add_mutually_exclusive_group()
-    where.add_argument("--workers", metavar="N", type=_workers, default=_cores(), help="processes (default: cores)")
+    add_workers(where)
     where.add_argument("--scheduler", metavar="ADDRESS", help="work on the Dask workers of tls://HOST:PORT instead")
     where.add_argument("--profile", metavar="FILE", help="work on the machines that a YAML file describes instead")
+
+
+def add_workers(command: argparse._ActionsContainer) -> None:
+    """Let a command have `--workers`."""
+    command.add_argument("--workers", metavar="N", type=_workers, default=_cores(), help="processes (default: cores)")
 
 
 def profile_of(options: argparse.Namespace) -> Profile | None:

@@ -61,10 +61,10 @@ class Makers:
         """What `meet` says, before there is a row: what is not known yet, as the variant, does not differ."""
         if line in self._known:
             return None
-        mine = _items(line)
+        mine = items(line)
         others: dict[str, set[str]] = {}
         for known in self._known:
-            for name, value in _items(known).items():
+            for name, value in items(known).items():
                 if value != mine.get(name, value) and f"{name} {mine[name]}" not in self._said:
                     others.setdefault(name, set()).add(value)
         if not others:
@@ -97,6 +97,6 @@ def _cpu() -> str:
     return platform.processor() or "unknown"
 
 
-def _items(line: str) -> dict[str, str]:
+def items(line: str) -> dict[str, str]:
     """The names and values of a maker's line; of a stranger's, whatever looks like one."""
     return {name: value for name, _, value in (item.partition(" ") for item in line.split(_BETWEEN))}

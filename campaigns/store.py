@@ -13,6 +13,7 @@ import json
 from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from conespot.campaigns.cases import write_cases
 from conespot.campaigns.ending import RunError
@@ -32,6 +33,9 @@ from conespot.scene import InputError
 from conespot.scene.atomic import write_atomically
 from conespot.scene.document import Document, dump, read_document
 from conespot.scene.identity import SCHEMA
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 #: damaged lines that are named one by one
 _MOST_NAMED = 5
@@ -101,12 +105,16 @@ class Store:
         with contextlib.suppress(InputError):
             write_atomically(self.folder / STANDING, standing.model_dump_json().encode())
 
+    def rows(self) -> pd.DataFrame:
+        """The rows of what is finished, in the plan's order."""
+        stated = Stated.by(entry.stated for entry in self.entries.values())
+        return row_table(self.plan, self.entries, self.record, stated)
+
     def write_rows(self) -> int:
         """Write errors.csv and errors.parquet of what is finished, in the plan's order, who made it; how many rows."""
         if not self.entries:
             return 0
-        stated = Stated.by(entry.stated for entry in self.entries.values())
-        frame = row_table(self.plan, self.entries, self.record, stated)
+        frame = self.rows()
         begun = in_a_line(self.begun_with)
         makers = Counter(entry.by or begun for entry in self.entries.values() if not entry.error)
         write_atomically(self.folder / MAKERS, json.dumps(dict(sorted(makers.items())), ensure_ascii=False).encode())

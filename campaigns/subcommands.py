@@ -137,6 +137,28 @@ def check(options: argparse.Namespace) -> Ending:
     return Ending.FAILED if checked.missed else Ending.DONE
 
 
+def pack(options: argparse.Namespace) -> Ending:
+    """Make one archive of a run."""
+    from conespot.campaigns.pack import pack
+
+    _say(pack(options.folder, options.out))
+    return Ending.DONE
+
+
+def verify(options: argparse.Namespace) -> Ending:
+    """Check an archive of a run."""
+    from conespot.campaigns.pool import LocalPool
+    from conespot.campaigns.verify import verify
+
+    verdict = verify(options.archive, options.sample, options.seed, LocalPool(options.workers))
+    for sentence in verdict.said:
+        _say(sentence)
+    for sentence in verdict.wrong:
+        _fail(sentence, Ending.FAILED)
+    _say(f"{options.archive}: {'does not hold' if verdict.wrong else 'holds'}")
+    return Ending.FAILED if verdict.wrong else Ending.DONE
+
+
 def debug(options: argparse.Namespace) -> Ending:
     """Render one pose again, and draw what was seen."""
     from conespot.campaigns.debug import debug

@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+import contextlib
 import os
 import secrets
+from collections.abc import Iterator
 from pathlib import Path
+from typing import BinaryIO
 
 from conespot.scene.document import InputError
 
@@ -15,13 +18,20 @@ def write_atomically(path: Path, data: bytes | memoryview, option: str = "--out"
     The folder must exist. Whatever happens, `path` holds its old content or all of the new, and no temporary file
     is left behind by an error. Raises InputError if the file cannot be written; `option` is where to name another.
     """
+    with replacing(path, option) as stream:
+        stream.write(data)
+
+
+@contextlib.contextmanager
+def replacing(path: Path, option: str = "--out") -> Iterator[BinaryIO]:
+    """A stream whose content stands in `path` once it ends without an error, as `write_atomically` does it."""
     temporary = path.with_name(f".{path.name[:100]}.{secrets.token_hex(4)}.tmp")
     try:
         # not tempfile, whose files nobody else may read
-        handle = os.open(temporary, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o666)
+        handle = os.open(temporary, os.O_RDWR | os.O_CREAT | os.O_EXCL, 0o666)
         try:
-            with open(handle, "wb") as stream:
-                stream.write(data)
+            with open(handle, "w+b") as stream:
+                yield stream
                 stream.flush()
                 os.fsync(stream.fileno())
             os.replace(temporary, path)
