@@ -23,22 +23,21 @@ def refracted(optics: Optics, rays: Rays, wavelength: float, *, stopped: bool = 
 
     NaN where a ray misses a surface and, if `stopped`, where the iris stops it.
     """
-    origins, directions, off = _entering(optics, rays.origins, rays.directions, wavelength)
+    # all five at once: of an outline's few points each call would cost more than its rays
+    steps = [(by, step) for by in ("x", "y") for step in (_STEP, -_STEP)]
+    o, d = np.broadcast_arrays(rays.origins, rays.directions)
+    beside = {"x": (rays.origins_by_x, rays.directions_by_x), "y": (rays.origins_by_y, rays.directions_by_y)}
+    all_origins = np.stack([o, *(o + step * beside[by][0] for by, step in steps)])
+    all_directions = np.stack([d, *(d + step * beside[by][1] for by, step in steps)])
+    origins, directions, off = _entering(optics, all_origins, all_directions, wavelength)
     if stopped:
-        hidden = ~(off <= 1.0)
-        origins[hidden] = directions[hidden] = np.nan
-    changes = []
-    for origins_by, directions_by in (
-        (rays.origins_by_x, rays.directions_by_x),
-        (rays.origins_by_y, rays.directions_by_y),
-    ):
-        ahead, behind = (
-            _entering(optics, rays.origins + step * origins_by, rays.directions + step * directions_by, wavelength)
-            for step in (_STEP, -_STEP)
-        )
-        changes.append([(more - less) / (2.0 * _STEP) for more, less in zip(ahead[:2], behind[:2], strict=True)])
-    (origins_by_x, directions_by_x), (origins_by_y, directions_by_y) = changes
-    return Rays(origins, directions, origins_by_x, origins_by_y, directions_by_x, directions_by_y)
+        hidden = ~(off[0] <= 1.0)
+        origins[0][hidden] = directions[0][hidden] = np.nan
+    by_x, by_y = (
+        ((origins[k] - origins[k + 1]) / (2.0 * _STEP), (directions[k] - directions[k + 1]) / (2.0 * _STEP))
+        for k in (1, 3)
+    )
+    return Rays(origins[0], directions[0], by_x[0], by_y[0], by_x[1], by_y[1])
 
 
 def _entering(optics: Optics, origins: Array, directions: Array, wavelength: float) -> tuple[Array, Array, Array]:
