@@ -6,7 +6,7 @@ import argparse
 from collections.abc import Callable
 from pathlib import Path
 
-from conespot.campaigns import subcommands
+from conespot.campaigns import new_microscope, subcommands
 from conespot.campaigns.ending import Ending
 from conespot.campaigns.machines import add_machines, add_workers
 from conespot.campaigns.new_campaign import QUESTIONS
@@ -42,10 +42,13 @@ def parser() -> argparse.ArgumentParser:
 
 def _add_campaigns(add: _Add) -> None:
     """What begins with a campaign or a scene."""
-    init = add(subcommands.init, "write a commented campaign of your own, from a few answers or options")
-    init.add_argument("file", nargs="?", type=Path, default=Path("my_campaign.yaml"), help="(default: %(default)s)")
+    init = add(subcommands.init, "write a commented campaign or microscope of your own, from a few answers or options")
+    named = "(default: my_campaign.yaml, or my_microscope.yaml)"
+    init.add_argument("file", nargs="?", type=Path, help=named)
+    init.add_argument("--microscope", action="store_true", help="write the scene of your own microscope instead")
     init.add_argument("--defaults", action="store_true", help="ask nothing, take the default where no option is given")
     add_questions(init, QUESTIONS, "the answers, asked for on a terminal")
+    add_questions(init, new_microscope.QUESTIONS, "those of a microscope")
     run = add(subcommands.run, "render, localize and compare; an interrupted run is continued")
     plan = add(subcommands.plan, "say what a run would do")
     validate = add(subcommands.validate, "check a campaign and every combination it sweeps over")
@@ -115,7 +118,13 @@ def _add_own(add: _Add) -> None:
     localize.add_argument("--alarm", metavar="DISTANCE", help=alarm)
     chance = "chance that a tip called safe is not, by the stated sigma (default: 0.001)"
     localize.add_argument("--false-safe", type=float, default=1e-3, metavar="P", help=chance)
+    calibrate = add(subcommands.calibrate, "find out of a sequence what it shows of your microscope and the eye")
+    calibrate.add_argument("frames", type=Path, nargs="+", metavar="FRAMES", help="images, folders of images, videos")
+    calibrate.add_argument("--scene", required=True, help="the YAML file that describes the microscope so far")
+    calibrate.add_argument("--out", type=Path, required=True, metavar="FILE", help="the scene's file to write")
+    calibrate.add_argument("--shape", action="store_true", help="find the retina's semi-axes in place of its radius")
     add_set(localize)
+    add_set(calibrate)
 
 
 def _add_results(add: _Add) -> None:

@@ -88,6 +88,15 @@ def answers(options: argparse.Namespace, questions: Iterable[Question]) -> dict[
     return found
 
 
+def refuse_answers(options: argparse.Namespace, questions: Iterable[Question], what: str) -> None:
+    """Raises InputError for an option that answers a question of something else, which is `what` in words."""
+    from conespot.scene.document import InputError
+
+    for question in questions:
+        if getattr(options, question.name.replace("-", "_")) is not None:
+            raise InputError(f"--{question.name}: is asked of a {what}")
+
+
 def _asked(question: Question, default: str) -> str:
     """What a person answers, asked again until it is understood."""
     if question.choices is not None:

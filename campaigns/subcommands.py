@@ -16,11 +16,21 @@ if TYPE_CHECKING:
 
 
 def init(options: argparse.Namespace) -> Ending:
-    """Write a campaign from a few answers."""
-    from conespot.campaigns.new_campaign import QUESTIONS, write_campaign
-    from conespot.campaigns.questions import answers
+    """Write a campaign, or a microscope's scene, from a few answers."""
+    from pathlib import Path
 
-    rows = write_campaign(options.file, answers(options, QUESTIONS))
+    from conespot.campaigns import new_campaign, new_microscope
+    from conespot.campaigns.questions import answers, refuse_answers
+
+    if options.microscope:
+        refuse_answers(options, new_campaign.QUESTIONS, "campaign; leave --microscope out")
+        path = options.file or Path("my_microscope.yaml")
+        new_microscope.write_microscope(path, answers(options, new_microscope.QUESTIONS))
+        _say(f"{path}: next: campaign localize FRAMES --scene {path}")
+        return Ending.DONE
+    refuse_answers(options, new_microscope.QUESTIONS, "microscope; add --microscope")
+    options.file = options.file or Path("my_campaign.yaml")
+    rows = new_campaign.write_campaign(options.file, answers(options, new_campaign.QUESTIONS))
     _say(f"{options.file}: {rows} rows; next: campaign plan {options.file}")
     return Ending.DONE
 
@@ -180,6 +190,15 @@ def localize(options: argparse.Namespace) -> Ending:
     for line in localize(own, options.frames, alarm, beside, count):
         _say(line)
     return _fail(count.sentence, Ending.FAILED) if count.sentence else Ending.DONE
+
+
+def calibrate(options: argparse.Namespace) -> Ending:
+    """Calibrate a scene from frames of one's own."""
+    from conespot.campaigns.own_calibration import calibrate_own
+
+    for line in calibrate_own(options.frames, options.scene, options.set, options.out, shape=options.shape):
+        _say(line)
+    return Ending.DONE
 
 
 def list(options: argparse.Namespace) -> Ending:

@@ -244,10 +244,10 @@ def _term(fit: EdgeFit, scene: Scene, tight: Knowns, width: Width) -> tuple[Arra
     data = fit.information.copy()
     data[np.arange(size, own), np.arange(size, own)] -= own_prior
     slope = np.concatenate([np.zeros(size), own_prior * (here - nominal)])
-    assert tight.rcm_sigma_mm is not None
-    tie = rows[:, :own] / tight.rcm_sigma_mm
+    # as tight as it was: a patch that is small is fitted through the RCM itself
+    tie = fit.prior[:2]
     data -= tie.T @ tie
-    slope += tie.T @ (miss / tight.rcm_sigma_mm)
+    slope += tie.T @ (miss * float(np.linalg.norm(tie[0, :3])))
     # the same slope where the common quantities have the scene's values
     slope += data[:, size:] @ (here - nominal)
     information, pull = np.zeros((own + 3, own + 3)), np.zeros(own + 3)

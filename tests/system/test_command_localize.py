@@ -116,3 +116,50 @@ def test_a_scenes_own_word_on_how_well_it_is_known_is_told_to_the_localizer(own,
     unsure = sigma("--set", "knowledge.relief_sigma=0.05 mm")
     assert unsure == pytest.approx(math.hypot(sure, 0.05), rel=1e-6)
     assert load_scene(own / "my.yaml").camera.resolution == 400  # whoever wants the scene alone may read it too
+
+
+def calibrated(folder, own, scene, *options, rays):
+    """The scene that `campaign calibrate` makes of four frames of `scene`, and the file's text."""
+    for number in range(4):
+        tip = np.array([2.5 * math.sin(1.7 * number), 2.5 * math.cos(1.7 * number), 3.0 + 0.5 * number])
+        cv2.imwrite(str(folder / f"{number}.png"), photograph(scene, scene.pose(tip), seed=number, rays=rays))
+    resolution = f"scene.camera.resolution={scene.camera.resolution}"
+    command = ["calibrate", folder, "--scene", own / "my.yaml", "--out", folder / "calibrated.yaml"]
+    assert main([*map(str, command), "--set", resolution, *options]) == 0
+    return load_scene(folder / "calibrated.yaml"), (folder / "calibrated.yaml").read_text()
+
+
+def test_what_a_sequence_does_not_show_stays_as_it_was_and_is_said_with_what_would_show_it(own, tmp_path, capsys):
+    """One spotlight at 300 px, and an RCM told 0.05 mm off: nothing of it can be known."""
+    off = ["--set", "scene.instrument.rcm=[6.05 mm, 0 mm, 22 mm]"]
+    found, text = calibrated(tmp_path, own, scene_of(HardBeam(), resolution=300), *off, rays=4)
+    said = capsys.readouterr().out
+    for name in ("half_angle", "camera_height", "rcm_x"):
+        assert f"{name}: not observable" in said
+    assert "what would show it: an object of known size" in said
+    assert found.instrument.rcm == pytest.approx((6.05, 0.0, 22.0))
+    assert found.camera == load_scene(own / "my.yaml").camera.with_columns(300)
+    assert "rcm_sigma: 0.02 mm" in text  # as well as it was known before
+    assert "\n#   rcm_x: not observable" in text
+    assert max(map(len, text.splitlines())) <= 120
+    assert main(["localize", str(tmp_path / "0.png"), "--scene", str(tmp_path / "calibrated.yaml")]) == 0
+
+
+@pytest.mark.slow
+def test_three_spotlights_give_the_half_angle_back_and_the_next_command_takes_it(own, tmp_path):
+    """Told 9 deg, which are 9.03; four frames of 500 px."""
+    scene = scene_of(HardBeam(half_angle=math.radians(9.03)), "triple", resolution=500)
+    found, text = calibrated(tmp_path, own, scene, "--set", "scene.spotlights=triple", rays=8)
+    assert math.degrees(found.beam.half_angle) == pytest.approx(9.03, abs=5e-3)
+    assert "half_angle_sigma: 0 deg" not in text
+    assert main(["localize", str(tmp_path / "0.png"), "--scene", str(tmp_path / "calibrated.yaml")]) == 0
+
+
+def test_the_scene_that_is_calibrated_is_not_written_over(own, capsys):
+    command = ["calibrate", own / "frames", "--scene", own / "my.yaml", "--out", own / "my.yaml"]
+    assert main([*map(str, command)]) == 2
+    assert "is the scene that is calibrated" in capsys.readouterr().err
+    command[-1] = own / "other.yaml"
+    assert main([*map(str, command)]) == 2  # two frames are too few
+    assert "at least three frames" in capsys.readouterr().err
+    assert not (own / "other.yaml").exists()

@@ -1,0 +1,101 @@
+"""`campaign calibrate`: what a sequence of one's own frames shows of the microscope and the eye, as a scene's file."""
+
+from __future__ import annotations
+
+import math
+import os
+import textwrap
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
+from pathlib import Path
+
+from conespot.campaigns.answers import can_hold
+from conespot.campaigns.knowledge import Knowledge
+from conespot.campaigns.own_scene import described_scene
+from conespot.localize.calibration import NAMES, Calibration, Width, calibrate
+from conespot.localize.frames.reader import read_frames
+from conespot.localize.model.quantity import QUANTITIES
+from conespot.scene import InputError, Scene
+from conespot.scene.atomic import write_atomically
+from conespot.scene.document import Document, dump, find_document, read_value
+from conespot.scene.identity import essence
+from conespot.scene.population import SEMI_AXES_SIGMA_MM
+from conespot.scene.quantity import format_quantity
+from conespot.scene.scene import KNOWLEDGE, read_scene
+
+#: what would show a quantity that a sequence does not, by the beginning of its name
+_REMEDIES = {
+    "half_angle": "three spotlights on one needle, or a chart at a known distance from the tip",
+    "softness": "frames whose patch is not clipped, near and far",
+    "eye_radius": "tips 5 mm apart all over the retina, or the eye's axial length by biometry",
+    "camera_height": "an object of known size in the eye, since no frame tells how large the whole scene is",
+    "retina": "tips 5 mm apart all over the retina, or OCT of it",
+    "rcm": "tips further apart to the sides and in height: their axes meet in the RCM",
+}
+#: what no sequence is asked about, and who says it
+_NEVER = "camera's tilt, azimuth and lens: take OpenCV's calibration of the microscope as camera: {calibration: FILE}"
+_EXACT_MM = 1e-9
+#: kinds of quantities by the unit of a sigma
+_KINDS = {"deg": "angle", "mm": "length"}
+_WIDTH = 110
+
+
+def calibrate_own(
+    sources: Sequence[Path], name: str, settings: Sequence[str], out: Path, *, shape: bool
+) -> Iterator[str]:
+    """Calibrate a scene from frames and write it with its knowledge; what was found, a line a quantity.
+
+    With `shape` the retina's semi-axes are found in place of the eye's radius. Raises InputError for a scene or frames
+    that cannot be used, fewer than three frames in which the patch can be measured, and a file that cannot be written.
+    """
+    can_hold(out, "--out")
+    given = find_document(name, "scene", "presets", "scene preset")
+    if out.exists() and os.path.samefile(out, given):
+        raise InputError(f"{out}: is the scene that is calibrated; choose another --out")
+    scene, knowledge = described_scene(name, settings, "calibrate")
+    width = Width()
+    if shape:
+        width = replace(width, eye_radius_mm=_EXACT_MM, semi_axes_mm=SEMI_AXES_SIGMA_MM)
+    found = calibrate(lambda: (frame.image for frame in read_frames(sources, scene)), scene, width=width)
+    said = [*_said(found), f"not asked: {_NEVER}"]
+    text = _file(scene, knowledge, found, said, width)
+    read_scene(Document(str(out), _without_knowledge(text, out), folder=out.parent))  # what is written can be read
+    write_atomically(out, text.encode())
+    yield from said
+    yield f"{out}: from {found.frames} frames; next: campaign localize FRAMES --scene {out}"
+
+
+def _said(found: Calibration) -> Iterator[str]:
+    """A line a quantity: its value and sigma, or what would show it."""
+    for line in found.statement().splitlines():
+        quantity = line.partition(":")[0]
+        remedy = next(said for start, said in _REMEDIES.items() if quantity.startswith(start))
+        yield line if found.observable[quantity] else f"{line}; what would show it: {remedy}"
+
+
+def _file(scene: Scene, knowledge: Knowledge, found: Calibration, said: Sequence[str], width: Width) -> str:
+    """The text of a scene's file: what was found in comments, the scene, and how well it is known."""
+    known = {key: value for key, value in knowledge.model_dump(mode="json").items() if key.endswith("_sigma")}
+    for quantity, sigma in zip(QUANTITIES, found.sigmas, strict=False):
+        field = _field(quantity.known)
+        if found.observable[quantity.name] and field in known:
+            rounded = float(f"{sigma:.3g}")
+            known[field] = format_quantity(rounded, _KINDS[quantity.unit]) if quantity.unit else rounded
+    if all(found.observable[name] for name in NAMES[-3:]):
+        sideways = math.hypot(width.play_mm, float(max(found.sigmas[-3:])))
+        known["rcm_sigma"] = format_quantity(float(f"{sideways:.3g}"), "length")
+    lines = [f"# Written by `campaign calibrate` from {found.frames} frames, with standard deviations:"]
+    lines += [textwrap.fill(line, _WIDTH, initial_indent="#   ", subsequent_indent="#     ") for line in said]
+    lines += ["# What is not said here is as conespot has it by default; `campaign explain KEY` says what a key means."]
+    lines += [dump(essence(found.applied(scene))).rstrip(), "# how well the localizers may take it to be known"]
+    return "\n".join([*lines, dump({KNOWLEDGE: known})])
+
+
+def _field(known: str) -> str:
+    """The key of `Knowledge` for a field of `Knowns`, which has its unit behind it."""
+    return known.removesuffix("_deg").removesuffix("_mm")
+
+
+def _without_knowledge(text: str, out: Path) -> dict[str, object]:
+    data: dict[str, object] = read_value(text, str(out))
+    return {key: value for key, value in data.items() if key != KNOWLEDGE}
