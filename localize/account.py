@@ -96,7 +96,7 @@ def _patch(frame: Frame, estimate: Estimate, spotlight: int, at: Window) -> Patc
     shown = max(Shown.each(frame, at), key=lambda plane: np.count_nonzero(plane.usable))
     bins = Bins(at, estimate, Knowns(), spotlight)
     lit = np.zeros(shown.signal.size)
-    lit[bins.lit] = bins.spotlight(estimate)[0]
+    lit[bins.lit] = bins.spotlight(estimate)[0][0]
     levels = np.column_stack([bins.ambient, lit])
     seen = bins.seen & np.isfinite(lit)
     light, clipped = shown.signal.ravel(), ~shown.usable.ravel()

@@ -26,7 +26,7 @@ def cone(
     noise: NoiseModel | None = None,
 ) -> Outcome:
     """The tip from a checked image `[H, W]` or `[H, W, 3]`; `reference` (no spotlight) helps the search only."""
-    known, sensor, frame = knowns or Knowns(), noise or scene.sensor.noise, Frame(image, scene.sensor)
+    known, sensor, frame = (knowns or Knowns()).within(scene), noise or scene.sensor.noise, Frame(image, scene.sensor)
     starts = find_starts(frame, scene, reference)
     return believed(starts, scene, lambda start: edge_outcome(frame, Estimate(start.pose, scene), known, sensor))
 

@@ -30,7 +30,7 @@ def photometric(
     noise: NoiseModel | None = None,
 ) -> Outcome:
     """The tip from a checked image `[H, W]` or `[H, W, 3]`; `reference` is the same view in ambient light alone."""
-    known, sensor, frame = knowns or Knowns(), noise or scene.sensor.noise, Frame(image, scene.sensor)
+    known, sensor, frame = (knowns or Knowns()).within(scene), noise or scene.sensor.noise, Frame(image, scene.sensor)
 
     def localized(start: Start) -> Outcome:
         estimate = Estimate(start.pose, scene)

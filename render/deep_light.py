@@ -21,21 +21,23 @@ import scipy.fft
 from numpy.typing import NDArray
 
 from conespot.render import spectral
-from conespot.render.chart import CELL, Chart
 from conespot.render.fundus_anatomy import COARSE, EXTENT
 from conespot.render.fundus_maps import fundus_maps
 from conespot.render.retina_mesh import arc_extent
 from conespot.render.source import stands
 from conespot.scene import Pose, Scene, fundus
+from conespot.scene.chart import Chart
 from conespot.scene.power import Power
-from conespot.scene.retina import Fundus
+from conespot.scene.retina import Fundus, Spread
 from conespot.scene.spectrum import Curve
 from conespot.scene.spotlights import spotlight_axes
-from conespot.scene.spread import WIDTHS, Kernel, spread_kernel
+from conespot.scene.spread import Kernel, spread_kernel
 
 Array = NDArray[np.float64]
 Maps = NDArray[np.float32]
 
+#: side of a map's cell [mm]
+CELL = 0.02
 #: share of the deep light that comes back further away than the maps reach
 LOST = 1e-3
 #: rays of a spotlight
@@ -68,8 +70,8 @@ class DeepLight:
     def __init__(self, scene: Scene, retina: Fundus, films: list[Curve]) -> None:
         self.scene, self.retina = scene, retina
         self.wavelengths, self._films = nodes(films), films
-        factor = retina.spread.scattering if retina.spread else 1.0
-        self.kernels = [spread_kernel(w, retina.pigmentation, factor) for w in self.wavelengths]
+        self._how = how = retina.spread or Spread()
+        self.kernels = [spread_kernel(w, retina.pigmentation, how.scattering, how.length) for w in self.wavelengths]
         self.reach = max(kernel.reach(LOST) for kernel in self.kernels)
 
     def spotlight(self, pose: Pose, spotlight: int) -> DeepMaps:
@@ -77,7 +79,7 @@ class DeepLight:
         scene, beam = self.scene, self.scene.beam
         intensity = Power(value=1.0, convention=scene.power.convention).axial_intensity(beam) * _PER_M2
         centre, around = self._patch(pose, spotlight)
-        chart = Chart.about(scene, centre, around + self.reach)
+        chart = Chart.about(scene, centre, around + self.reach, CELL)
         points = stands(scene, pose, spotlight)
         density = np.zeros((chart.side, chart.side))
         for point in points:
@@ -97,7 +99,7 @@ class DeepLight:
         centre, around = self._patch(pose, spotlight)
         turn = np.arange(points) * 2.0 * math.pi / points
         ring = (around + self.reach) * np.stack([np.cos(turn), np.sin(turn)], axis=-1)
-        return self.scene.surface.points(self.scene.eye, Chart.about(self.scene, centre, 0.0).directions(ring))
+        return self.scene.surface.points(self.scene.eye, Chart.about(self.scene, centre, 0.0, CELL).directions(ring))
 
     def _patch(self, pose: Pose, spotlight: int) -> tuple[Array, float]:
         """The middle of a spotlight's patch `[3]` and how far from it light falls [mm]."""
@@ -109,7 +111,7 @@ class DeepLight:
     def ambient(self) -> DeepMaps:
         """Of the microscope's light, over all that the camera sees."""
         scene = self.scene
-        chart = Chart.about(scene, np.zeros(3), arc_extent(scene) + self.reach)
+        chart = Chart.about(scene, np.zeros(3), arc_extent(scene) + self.reach, CELL)
         facing = scene.surface.normals(scene.eye, chart.cells) @ scene.ambient.towards
         density = scene.ambient.irradiance * np.maximum(facing, 0.0)
         if chart.stretch is not None:
@@ -141,7 +143,7 @@ class DeepLight:
         for film in self._films:
             x = np.linspace(film.low, film.high, _POINTS)
             light = film(x) * (film.integral() / np.trapezoid(film(x), x))
-            passed = light * typical(x) ** 2 / math.pi
+            passed = light * self._how.amount * typical(x) ** 2 / math.pi
             if spectral.has_water(self.scene):
                 passed *= fundus.water_transmission(x, water_mm)
             hats = [np.interp(x, self.wavelengths, one) for one in np.eye(len(self.wavelengths))]
@@ -231,7 +233,7 @@ def _convolved(values: NDArray[np.float32], transfer: NDArray[np.float32]) -> ND
 
 def _transfer(side: int, kernel: Kernel) -> NDArray[np.float32]:
     """The kernel's Fourier transform on the frequencies of `rfft2` of a chart: Gaussians are those of x times of y."""
-    down, along = (np.exp(-2.0 * (np.pi * WIDTHS[:, None] * f) ** 2) for f in _frequencies(side))
+    down, along = (np.exp(-2.0 * (np.pi * kernel.widths[:, None] * f) ** 2) for f in _frequencies(side))
     return np.asarray((kernel.parts[:, None] * down).T @ along, np.float32)
 
 

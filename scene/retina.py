@@ -84,10 +84,13 @@ class Glint(Model):
 class Spread(Model):
     """Light that enters the tissue behind the pigment epithelium comes back elsewhere (scene.spread).
 
-    `scattering` multiplies the scattering coefficients of all layers, which are known to a factor of two.
+    `scattering` multiplies the scattering coefficients of all layers, which are known to a factor of two; `amount` the
+    deep light that the closed form gives, beside a local part that stays what it is; `length` the distances it goes.
     """
 
     scattering: float = Field(1.0, ge=0.5, le=2.0)
+    amount: float = Field(1.0, ge=0.25, le=4.0)
+    length: float = Field(1.0, ge=0.25, le=4.0)
 
 
 class Fundus(Model):

@@ -14,7 +14,6 @@ from importlib import resources
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from scipy.optimize import nnls
 
 from conespot.scene.retina import Pigmentation
 
@@ -35,26 +34,35 @@ class Kernel:
     """
 
     parts: Array  #: a of each of the `WIDTHS`, sum 1
+    length: float = 1.0  #: by which all of the `WIDTHS` are multiplied
+
+    @property
+    def widths(self) -> Array:
+        """Standard deviation of each Gaussian [mm]."""
+        return np.asarray(self.length * WIDTHS, float)
 
     def __call__(self, distance: ArrayLike) -> Array:
         """Density [1/mm2] at distances [mm], any shape."""
-        ratio = np.asarray(distance, float)[..., None] / WIDTHS
-        return np.asarray(np.exp(-0.5 * ratio**2) @ (self.parts / (2.0 * np.pi * WIDTHS**2)))
+        ratio = np.asarray(distance, float)[..., None] / self.widths
+        return np.asarray(np.exp(-0.5 * ratio**2) @ (self.parts / (2.0 * np.pi * self.widths**2)))
 
     def enclosed(self, radius: ArrayLike) -> Array:
         """Share that comes back within radii [mm], any shape."""
-        ratio = np.asarray(radius, float)[..., None] / WIDTHS
+        ratio = np.asarray(radius, float)[..., None] / self.widths
         return np.asarray(-np.expm1(-0.5 * ratio**2) @ self.parts)
 
     def reach(self, lost: float) -> float:
         """The radius [mm] outside which no more than the share `lost` comes back."""
-        radii = np.geomspace(WIDTHS[0] / 10.0, WIDTHS[-1] * 10.0, 2000)
+        radii = np.geomspace(self.widths[0] / 10.0, self.widths[-1] * 10.0, 2000)
         return float(radii[np.argmax(self.enclosed(radii) >= 1.0 - lost)])
 
 
-def spread_kernel(wavelength: float, pigmentation: Pigmentation, scattering: float = 1.0) -> Kernel:
+def spread_kernel(
+    wavelength: float, pigmentation: Pigmentation, scattering: float = 1.0, length: float = 1.0
+) -> Kernel:
     """The kernel of deep light at a wavelength [nm]; `scattering` multiplies every layer's coefficient, 0.5 to 2.
 
+    All of its distances are multiplied by `length`.
     Between the table's wavelengths its parts go in proportion, between its coefficients in proportion to their
     logarithm; beyond its first and last wavelength it stays as it is. Raises ValueError for other coefficients.
     """
@@ -63,7 +71,7 @@ def spread_kernel(wavelength: float, pigmentation: Pigmentation, scattering: flo
         raise ValueError(f"scattering {scattering:g} is not within the table's {factors[0]:g} to {factors[-1]:g}")
     across = np.stack([[np.interp(wavelength, wavelengths, column) for column in rows.T] for rows in parts])
     at, known = np.log(scattering), np.log(factors)
-    return Kernel(np.array([np.interp(at, known, column) for column in across.T]))
+    return Kernel(np.array([np.interp(at, known, column) for column in across.T]), length)
 
 
 @dataclass(frozen=True, eq=False)
@@ -94,6 +102,8 @@ def spread_table(pigmentation: Pigmentation) -> Table:
 @functools.cache
 def _parts(pigmentation: Pigmentation) -> tuple[Array, Array, Array]:
     """Wavelengths `[W]`, factors `[S]`, and the parts of the Gaussians `[S, W, G]` that have the table's shares."""
+    from scipy.optimize import nnls  # every process of a campaign would wait for it
+
     table = spread_table(pigmentation)
     rings = np.diff(-np.expm1(-0.5 * (table.radii[:, None] / WIDTHS) ** 2), axis=0, prepend=0.0)
     found = np.empty((*table.enclosed.shape[:2], len(WIDTHS)))

@@ -13,19 +13,21 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from conespot.localize.edge.nuisances import Nuisances, first_gain
+from conespot.localize.edge.nuisances import Nuisances, first_gain, gain_over
 from conespot.localize.edge.ribbon import Ribbon
 from conespot.localize.edge.sandwich import EdgeFit
 from conespot.localize.edge.settings import EDGE, Level
 from conespot.localize.edge.strips import Eliminated, score_covariance
+from conespot.localize.edge.surroundings import surroundings
 from conespot.localize.image import Frame, Reference
+from conespot.localize.model.deep import Deep
 from conespot.localize.model.estimate import Estimate
 from conespot.localize.model.forward import ambient_irradiance, look
 from conespot.localize.model.knowns import Knowns
 from conespot.localize.model.noise import NoiseModel
 from conespot.localize.model.prior import prior_rows
 from conespot.localize.model.solve import limited, reduction, solved
-from conespot.localize.model.view import spotlight_irradiance
+from conespot.localize.model.view import Irradiance, Lights
 from conespot.localize.outcome import COVERED, UNCERTAIN, LocalizationFailure
 
 Array = NDArray[np.float64]
@@ -93,26 +95,27 @@ def fit_band(
     sight = look(nominal, band.pixels, side)
     irradiance = ambient_irradiance(sight, nominal)
     pitch = nominal.camera.pixel_pitch * side
-    light, rows = spotlight_irradiance(sight, estimate, knowns, band.pixels, side)
+    shed = Irradiance(sight, band.pixels, side, estimate, knowns, np.ones(len(band.pixels), bool))
+    lights = shed(estimate)
     if before is None:
         usual = np.array([EDGE.level, EDGE.slope_per_mm * pitch])
-        begin = [(first_gain(shown, irradiance, light, band.strips.offset), usual) for shown in band.shown]
+        begin = [(gain, usual, told) for gain, told in _first_gains(frame, estimate, band, irradiance, lights)]
     else:
-        begin = [(c.gain, c.spread * [1.0, side / math.sqrt(c.pixels)]) for c in before.channels]
+        begin = [(c.gain, c.spread * [1.0, side / math.sqrt(c.pixels)], c.told) for c in before.channels]
     smallest = np.array([EDGE.smallest, EDGE.smallest / (level.inner + level.outer)])
     channels = [
-        Nuisances(shown, band.strips, noise, side**2, gain, spread, smallest)
-        for shown, (gain, spread) in zip(band.shown, begin, strict=True)
+        Nuisances(shown, band.strips, noise, side**2, gain, spread, smallest, told=told)
+        for shown, (gain, spread, told) in zip(band.shown, begin, strict=True)
     ]
     information, pj, step = np.eye(size), np.zeros((0, size)), np.zeros(size)
     for turn in range(level.iterations):
         if turn:
-            light, rows = spotlight_irradiance(sight, estimate, knowns, band.pixels, side)
+            lights = shed(estimate)
         pr, pj = prior_rows(estimate, nominal, used)
         information, gradient = pj.T @ pj, -pj.T @ pr
         parts = []
-        for channel in channels:
-            channel.evaluate(irradiance, light, rows)
+        for c, channel in enumerate(channels):
+            channel.evaluate(irradiance, *lights[c])
             part = channel.eliminated(size)
             reduced = reduction(part.information, size)
             parts.append(part)
@@ -129,6 +132,21 @@ def fit_band(
         if length < enough**2 and turn >= 2:
             break
     return BandFit(estimate, information, pj, step, band.covered, tuple(channels))
+
+
+def _first_gains(
+    frame: Frame, estimate: Estimate, band: Ribbon, irradiance: Array, lights: Lights
+) -> list[tuple[float, tuple[float, float] | None]]:
+    """Where each channel's gain starts, and what tells it beside the band.
+
+    Light from under the retina is on both sides of an edge, and in a band it looks like ambient light.
+    """
+    offset = band.strips.offset
+    if Deep.of(estimate.scene) is None:
+        return [(first_gain(shown, irradiance, lights[c][0], offset), None) for c, shown in enumerate(band.shown)]
+    around = surroundings(frame, estimate)
+    gains = [gain_over(shown, irradiance, lights[c][0], offset, float(around[c])) for c, shown in enumerate(band.shown)]
+    return [(gain, (gain, EDGE.gain)) for gain in gains]
 
 
 def _with_own(part: Eliminated, step: Array) -> Array:

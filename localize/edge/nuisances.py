@@ -31,6 +31,7 @@ class Nuisances:
     level: float = math.nan  #: log albedo of all strips
     slow: Array = field(default_factory=lambda: np.zeros(0))  #: slopes that vary slowly around the outlines
     slow_spread: float = 0.0  #: and their prior sigma
+    told: tuple[float, float] | None = None  #: what tells the gain beside the band, and its sigma
     levels: Array = field(default_factory=lambda: np.zeros((0, 2)))  #: of each strip beyond it, and slope `[S, 2]`
     white: float = EDGE.white  #: what residuals scatter beyond the sensor's noise
 
@@ -76,7 +77,8 @@ class Nuisances:
     @property
     def precision(self) -> Array:
         """Prior precision of gain, level and slow slopes."""
-        return np.concatenate([[1e-9, 1e-9], np.full(len(self.slow), self.slow_spread**-2)])
+        gain = 1e-9 if self.told is None else self.told[1] ** -2
+        return np.concatenate([[gain, 1e-9], np.full(len(self.slow), self.slow_spread**-2)])
 
     def eliminated(self, size: int) -> Eliminated:
         """The normal equations of `size` shared parameters, gain, level and slow slopes, the strips' own eliminated."""
@@ -85,6 +87,8 @@ class Nuisances:
         own = range(size, len(part.gradient))
         part.information[own, own] += self.precision
         part.gradient[size + 2 :] -= self.precision[2:] * self.slow
+        if self.told is not None:
+            part.gradient[size] -= self.precision[0] * (self.gain - self.told[0])
         return part
 
     def scores(self) -> tuple[Array, Array]:
@@ -103,6 +107,16 @@ class Nuisances:
         self.spread = np.clip(found, self.smallest, EDGE.widest * self.spread)
         # albedo has no direction: across the outline it changes as much as along
         self.slow_spread = max(self.strips.slow_gradient(self.levels[:, 0]), float(self.smallest[1]))
+
+
+def gain_over(shown: Shown, irradiance: Array, light: Array, offset: Array, around: float) -> float:
+    """Log of the spotlights' intensity over the ambient irradiance, of which the surroundings show `around` [white]."""
+    inside = shown.usable & (offset < -1.0)
+    if np.count_nonzero(inside) < 5 or not around > 0.0:
+        return math.log(1e3 / max(float(light.max(initial=0.0)), 1e-9))
+    lit = np.exp(-shown.template[inside]) * shown.signal[inside]
+    excess = float(np.median((lit / around - irradiance[inside]) / light[inside]))
+    return math.log(max(excess, 1e-3 / float(light.max())))
 
 
 def first_gain(shown: Shown, irradiance: Array, light: Array, offset: Array) -> float:

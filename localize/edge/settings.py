@@ -64,6 +64,11 @@ class EdgeSettings:
     #: the scatter is measured on bins whose light changes with the tip's height by this share of what the steepest do.
     #: Not critical
     steady: float = 0.3
+    #: where light comes back from under the retina: rings around an outline, over its size, and points on each, which
+    #: show the retina without it, and how well they tell the gain (sigma of its logarithm): it is another place
+    around: tuple[float, ...] = (2.5, 3.0, 3.5)
+    around_points: int = 24
+    gain: float = 1.0
     #: longest step of the tip, in bins, and however small they are [mm]: within it an outline is nearly linear. No
     #: answer changes
     longest_step_bins: float = 3.0

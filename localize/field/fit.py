@@ -74,7 +74,7 @@ def fit_field(
     lead, pieces = _pieces(frame, start, knowns, noise, reference, level.bins)
     if not pieces:
         return LocalizationFailure(COVERED)
-    lights = [piece.bins.spotlight(estimate) for piece in pieces]
+    lights = [piece.bins.spotlight(estimate)[lead] for piece in pieces]
     gain = float(np.median([piece.begin(light) for piece, (light, _) in zip(pieces, lights, strict=True)]))
     if before is not None and before.lead == lead and len(before.pieces) == len(pieces):
         gain = before.gain
@@ -83,7 +83,7 @@ def fit_field(
     settled, prior, information = False, np.zeros((size, size)), np.eye(size + 1)
     for count in range(level.iterations):
         if count:
-            lights = [piece.bins.spotlight(estimate) for piece in pieces]
+            lights = [piece.bins.spotlight(estimate)[lead] for piece in pieces]
         tie = replace(knowns, rcm_sigma_mm=FIELD.tied_mm) if count < level.tied else knowns
         residuals, rows = prior_rows(estimate, nominal, tie)
         prior = rows.T @ rows

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 from conespot.localize.field.albedo import Modes, eliminate, even
 from conespot.localize.field.roughness import Roughness
 from conespot.localize.field.settings import FIELD
+from conespot.localize.model.gain import gain_between
 from conespot.localize.model.noise import NoiseModel
 from conespot.localize.model.residual import log_residuals, rms
 from conespot.localize.model.view import Bins, Shown
@@ -54,6 +55,8 @@ class Piece:
     def begin(self, light: Array) -> float:
         """Take the surroundings' albedo for all there is, and tell the log gain that the brighter half then shows."""
         plane, full, ambient = self._plane, self._full(light), self.bins.ambient.reshape(self._seen.shape)
+        if np.all(full[self._usable] > 0.0):
+            return self._begin_in_glow(full, ambient)
         dark, lit = self._usable & (full <= 0.0), self._usable & (full > 0.0)
         if np.count_nonzero(dark) < 10:
             dark = np.ones_like(dark)
@@ -64,6 +67,15 @@ class Piece:
         ratio = (plane.signal[lit] / (around * np.exp(plane.template[lit])) - ambient[lit]) / full[lit]
         bright = full[lit] >= np.quantile(full[lit], 0.5)
         return float(np.log(max(float(np.median(ratio[bright])), 1e-3 / float(light.max()))))
+
+    def _begin_in_glow(self, full: Array, ambient: Array) -> float:
+        """`begin` where light from under the retina is all over the window."""
+        signal = self._plane.signal / np.exp(self._plane.template)
+        low, high = np.quantile(full[self._usable], FIELD.glow) if self._usable.any() else (0.0, 0.0)
+        gain = gain_between(signal, ambient, full, self._usable & (full >= high), self._usable & (full <= low))
+        even = (signal / (ambient + np.exp(gain) * full))[self._usable]
+        self._albedo += np.log(max(float(np.median(even)), 1e-5) if len(even) else 1e-5)
+        return gain
 
     def resume(self, coarse: Piece) -> None:
         """Take over what a coarser fit knows of the albedo."""

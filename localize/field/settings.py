@@ -61,6 +61,8 @@ class FieldSettings:
     #: prior variance of the mean log albedo, which nothing restricts. Not critical
     mean_variance: float = 100.0
 
+    #: quantiles of the predicted light up to which, and from which on, bins tell the gain where all of them are lit
+    glow: tuple[float, float] = (0.2, 0.75)
     #: how much of a log ratio of channels the leading one's log albedo may hold (prior sigma). Not critical
     chroma: float = 0.5
     #: blur of the channels before their ratio [bins], or their noise would hide what they have in common: a half costs

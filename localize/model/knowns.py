@@ -3,14 +3,21 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from typing import Literal
 
+from conespot.localize.model.deep import Deep
 from conespot.localize.model.quantity import QUANTITIES, Quantity
 from conespot.scene.document import InputError
+from conespot.scene.scene import Scene
 
 #: how well the RCM is known where nobody says: an assumption and no measurement. An RCM that is 0.1 mm off sideways
 #: moves the tip by 12 um (3 mm high) to 25 um (6 mm), so this one leaves half of that
 RCM_SIGMA_MM = 0.05
+#: how well the amount of a scene's deep light and how far it goes are known, as logarithms: scattering coefficients of
+#: tissue are known to a factor of two
+DEEP_SIGMA = math.log(2.0)
+_USUAL = ("deep_amount_sigma", "deep_length_sigma")
 
 
 @dataclass(frozen=True)
@@ -31,11 +38,22 @@ class Knowns:
     #: how far the wall may be raised or sunk at any place beside what the scene's surface says [mm]: bumps nobody
     #: measured, a height map's error. No fit sees it; the distance from the wall does
     relief_sigma_mm: float = 0.0
+    #: of the logarithms of how much light comes back from under the retina and of how far it goes; usual is a factor of
+    #: two where the scene's retina spreads light, and elsewhere that none does
+    deep_amount_sigma: float | Literal["usual"] | None = "usual"
+    deep_length_sigma: float | Literal["usual"] | None = "usual"
 
     def __post_init__(self) -> None:
         for name, value in vars(self).items():
-            if value is not None and not (math.isfinite(value) and value >= 0.0):
+            if value is None or (value == "usual" and name in _USUAL):
+                continue
+            if isinstance(value, str) or not (math.isfinite(value) and value >= 0.0):
                 raise InputError(f"knowns: {name} must be 0 (exact), positive, or None (free), got {value!r}")
+
+    def within(self, scene: Scene) -> Knowns:
+        """The same with what is usual in such a scene."""
+        usual = 0.0 if Deep.of(scene) is None else DEEP_SIGMA
+        return replace(self, **{name: usual for name in _USUAL if getattr(self, name) == "usual"})
 
     @property
     def free(self) -> tuple[Quantity, ...]:
@@ -43,6 +61,8 @@ class Knowns:
         return tuple(each for each in QUANTITIES if self.sigma(each) != 0.0)
 
     def sigma(self, quantity: Quantity) -> float | None:
-        """Sigma of a quantity in the unit held inside; None if it is free."""
-        own: float | None = getattr(self, quantity.known)
-        return None if own is None else own * quantity.per_unit
+        """Sigma of a quantity in the unit held inside; None if it is free, 0 if it is usual and nobody says where."""
+        own: float | str | None = getattr(self, quantity.known)
+        if own is None:
+            return None
+        return 0.0 if isinstance(own, str) else own * quantity.per_unit

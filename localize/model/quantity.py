@@ -11,6 +11,7 @@ from dataclasses import dataclass
 from typing import Literal
 
 from conespot.scene.document import InputError
+from conespot.scene.retina import Fundus, Spread
 from conespot.scene.scene import Scene
 
 #: a softness below is a hard edge to every camera
@@ -24,7 +25,8 @@ class Quantity:
     name: str
     read: Callable[[Scene], float | None]  #: its value; None where the scene has no such thing
     write: Callable[[Scene, float], Scene]  #: the scene with another value
-    changes: Literal["beam", "sight"]  #: the beam's profile, or what the pixels see (surface, camera)
+    #: the beam's profile, what the pixels see (surface, camera), or light that comes back from under the retina
+    changes: Literal["beam", "sight", "glow"]
     step: float  #: of central differences of the light
     known: str  #: the field of `Knowns` that has its sigma
     per_unit: float = 1.0  #: the unit of that field in the one held inside
@@ -58,6 +60,21 @@ def _semi_axis(name: str, along: int) -> Quantity:
         return scene.model_copy(update={"surface": surface})
 
     return Quantity(name, read, write, changes="sight", step=1e-3, known="semi_axes_sigma_mm", unit="mm")
+
+
+def _spread(scene: Scene) -> Spread | None:
+    return scene.retina.spread if isinstance(scene.retina, Fundus) else None
+
+
+def _with_spread(scene: Scene, **values: float) -> Scene:
+    spread = _spread(scene)
+    assert spread is not None
+    new = scene.retina.model_copy(update={"spread": spread.model_copy(update=values)})
+    return scene.model_copy(update={"retina": new})
+
+
+def _log(value: float | None) -> float | None:
+    return None if value is None else math.log(value)
 
 
 #: in the order in which they join the parameters of a fit
@@ -103,6 +120,25 @@ QUANTITIES = (
     _semi_axis("retina_width", 0),
     _semi_axis("retina_height", 1),
     _semi_axis("retina_length", 2),
+    # both as logarithms: a factor is as likely as its inverse
+    Quantity(
+        name="deep_amount",
+        read=lambda scene: _log(getattr(_spread(scene), "amount", None)),
+        write=lambda scene, new: _with_spread(scene, amount=math.exp(new)),
+        changes="glow",
+        step=1e-3,
+        known="deep_amount_sigma",
+        remedy="describe its retina as a fundus with a spread",
+    ),
+    Quantity(
+        name="deep_length",
+        read=lambda scene: _log(getattr(_spread(scene), "length", None)),
+        write=lambda scene, new: _with_spread(scene, length=math.exp(new)),
+        changes="glow",
+        step=1e-3,
+        known="deep_length_sigma",
+        remedy="describe its retina as a fundus with a spread",
+    ),
 )
 
 

@@ -9,11 +9,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from conespot.localize.image import Frame, Reference
+from conespot.localize.model.deep import Deep
 from conespot.localize.model.estimate import Estimate
-from conespot.localize.model.forward import Sight, ambient_irradiance, light, light_by_surface, look, window
+from conespot.localize.model.forward import Light, Sight, ambient_irradiance, light, light_by_surface, look, window
+from conespot.localize.model.glow import DeepLight, Glow
 from conespot.localize.model.knowns import Knowns
 from conespot.localize.model.noise import NoiseModel
 from conespot.localize.model.occlusion import covered
+from conespot.localize.model.quantity import Quantity
 from conespot.scene.scene import Scene
 from conespot.scene.spotlights import spotlight_axes
 
@@ -163,7 +166,7 @@ def log_albedo(reference: Reference, scene: Scene, at: Window, noise: NoiseModel
 
 
 class Bins:
-    """A window's bins as the model sees them: light is computed only where the cones may reach."""
+    """A window's bins as the model sees them: light is computed only where the spotlights' may be."""
 
     def __init__(self, at: Window, estimate: Estimate, knowns: Knowns, spotlight: int) -> None:
         """The window is that of one `spotlight`.
@@ -174,7 +177,6 @@ class Bins:
         self.at, self.knowns = at, knowns
         scene = estimate.scene
         pixels = at.pixels
-        self._pixels = pixels
         mask = np.zeros((at.height, at.width), np.uint8)
         for k in range(len(scene.spotlights)):
             points = outline(estimate, k)
@@ -185,24 +187,96 @@ class Bins:
         sight = look(scene, pixels, at.side)
         ambient = ambient_irradiance(sight, scene)
         self.seen = np.isfinite(ambient)
-        self.lit = np.flatnonzero(self.seen & (cv2.dilate(mask, np.ones((reach, reach), np.uint8)).ravel() > 0))
+        near = self.seen & (cv2.dilate(mask, np.ones((reach, reach), np.uint8)).ravel() > 0)
+        # light from under the retina is everywhere
+        self.lit = np.flatnonzero(near if Deep.of(scene) is None else self.seen)
         self.ambient = np.where(self.seen, ambient, 1.0)
         self.seen &= ~covered(pixels, estimate.pose, scene, side=at.side)
         if len(scene.spotlights) > 1:
             to = sight.points - estimate.pose.apex
             cosines = to @ spotlight_axes(estimate.pose, scene.spotlights).T
             self.seen &= np.argmax(cosines, axis=1) == spotlight
-        self._sight = Sight(*(field[self.lit] for field in vars(sight).values()))
+        there = Sight(*(field[self.lit] for field in vars(sight).values()))
+        self._irradiance = Irradiance(there, pixels[self.lit], at.side, estimate, knowns, near[self.lit])
 
-    def spotlight(self, estimate: Estimate) -> tuple[Array, Array]:
-        """The spotlights' irradiance on the lit bins `[N]` and its derivatives by pose and free quantities `[P, N]`."""
-        return spotlight_irradiance(self._sight, estimate, self.knowns, self._pixels[self.lit], self.at.side)
+    def spotlight(self, estimate: Estimate) -> Lights:
+        """The spotlights' irradiance on the lit bins."""
+        return self._irradiance(estimate)
+
+
+@dataclass(frozen=True)
+class Lights:
+    """Irradiance on bins, and its derivatives by pose and free quantities, channel by channel."""
+
+    each: tuple[tuple[Array, Array], ...]  #: `[N]` and `[P, N]`; one for all channels where they see the same
+
+    def __getitem__(self, channel: int) -> tuple[Array, Array]:
+        """A channel's irradiance `[N]` and its derivatives `[P, N]`."""
+        return self.each[min(channel, len(self.each) - 1)]
+
+
+class Irradiance:
+    """The spotlights' irradiance on bins: what falls there, and what comes back from under the retina as if it did."""
+
+    def __init__(
+        self, sight: Sight, pixels: Array, side: int, near: Estimate, knowns: Knowns, lit: NDArray[np.bool_]
+    ) -> None:
+        """`sight` is what the bins of `side` px at `pixels` `[N, 2]` see of the surface `near` an estimate.
+
+        Light falls on those that are `lit` `[N]` alone.
+        """
+        self._sight, self._pixels, self._side, self._knowns = sight, pixels, side, knowns
+        self._lit = np.flatnonzero(lit)
+        self._there = sight if lit.all() else Sight(*(field[lit] for field in vars(sight).values()))
+        deep = Deep.of(near.scene)
+        self._glow = None if deep is None else Glow(near, sight.points, side * near.scene.camera.pixel_pitch)
+
+    def __call__(self, estimate: Estimate) -> Lights:
+        """The irradiance where a fit stands."""
+        lit = self._lit
+        local = spotlight_irradiance(self._there, estimate, self._knowns, self._pixels[lit], self._side)
+        if self._glow is None:
+            return Lights((local,))
+        if len(lit) < len(self._pixels):
+            value, rows = local
+            local = np.zeros(len(self._pixels)), np.zeros((len(rows), len(self._pixels)))
+            local[0][lit], local[1][:, lit] = value, rows
+        deep = Deep.of(estimate.scene)
+        assert deep is not None
+        lights = self._glow.light(estimate, self._knowns.free)
+        each = zip(deep.shares.tolist(), lights, strict=True)
+        return Lights(tuple(self._mixed(local, light, share, estimate) for share, light in each))
+
+    def _mixed(
+        self, local: tuple[Array, Array], deep: DeepLight, share: float, estimate: Estimate
+    ) -> tuple[Array, Array]:
+        """A channel's irradiance of which a `share` is deep, and its derivatives."""
+        value, rows = local
+        by_pose = [deep.jacobian]
+        here = Light(deep.value, deep.jacobian)
+        for each in (each for each in self._knowns.free if each.changes == "sight"):
+            sides = _sides(estimate, each, self._pixels, self._side)
+            by_pose.append(light_by_surface(here, self._sight, estimate.pose, sides, each.step)[None])
+        mixed = (1.0 - share) * rows + share * np.nan_to_num(np.concatenate(by_pose))
+        # the share's odds against the local light are what is known to a factor
+        by_glow = {
+            "deep_amount": share * (1.0 - share) * (deep.value - value),
+            "deep_length": share * deep.by_length,
+        }
+        own = [by_glow[each.name][None] for each in self._knowns.free if each.changes == "glow"]
+        return (1.0 - share) * value + share * deep.value, np.concatenate([mixed, *own])
+
+
+def _sides(estimate: Estimate, quantity: Quantity, pixels: Array, side: int) -> tuple[Sight, Sight]:
+    """What bins see with a little more of a quantity, and a little less."""
+    more, less = (look(estimate.beside(quantity, step), pixels, side) for step in (quantity.step, -quantity.step))
+    return more, less
 
 
 def spotlight_irradiance(
     sight: Sight, estimate: Estimate, knowns: Knowns, pixels: Array, side: int
 ) -> tuple[Array, Array]:
-    """The spotlights' irradiance on bins `[N]` and its derivatives by pose and free quantities `[P, N]`.
+    """The irradiance that falls on bins `[N]` and its derivatives by pose, beam and what bins see `[P, N]`.
 
     `sight` is what the bins of `side` px at `pixels` `[N, 2]` see of the nominal surface.
     """
@@ -213,8 +287,8 @@ def spotlight_irradiance(
     here = light(seen, estimate.pose, estimate.scene, estimate.profile, pose_size=estimate.pose_size, changes=changes)
     rows = [here.jacobian]
     for each in moving:
-        plus, minus = (look(estimate.beside(each, step), pixels, side) for step in (each.step, -each.step))
-        rows.append(light_by_surface(here, seen, estimate.pose, (plus, minus), each.step)[None])
+        sides = _sides(estimate, each, pixels, side)
+        rows.append(light_by_surface(here, seen, estimate.pose, sides, each.step)[None])
     jacobian = np.concatenate(rows)
     if moving:  # and the iris before some of the bins
         return np.nan_to_num(here.value), np.nan_to_num(jacobian)

@@ -10,8 +10,10 @@ from functools import lru_cache
 import cv2
 import numpy as np
 from numpy.typing import NDArray
+from scipy.special import i0e
 
 from conespot.localize.image import Signal
+from conespot.localize.model.deep import Deep
 from conespot.localize.model.occlusion import covered
 from conespot.localize.model.profile import Profile
 from conespot.localize.start.rings import Overview
@@ -19,6 +21,7 @@ from conespot.localize.start.settings import START
 from conespot.scene.beam import Beam
 from conespot.scene.pose import Pose
 from conespot.scene.scene import Scene
+from conespot.scene.spread import WIDTHS
 
 Array = NDArray[np.float64]
 #: where a beam's profile is tabulated, over its half angle: finer than any ray is sampled
@@ -104,15 +107,20 @@ def _across(
     log = overview.logarithm(light, ground).astype(float)
     core = along < START.inside
     inside, outside = (float(np.median(log[:, part])) for part in (core, along > START.outside))
-    profile = _profile(scene.beam)
+    radius = size * overview.step * scene.camera.pixel_pitch
+    profile = glowing(scene.beam, Deep.of(scene), radius)
     kernel = _kernel(round(min(START.widest_blur, math.hypot(blur, START.sampling_blur) / size), 2))
-    there = float(np.interp(0.5 * (along[0] + START.inside), _FRACTIONS, profile))
-    contrast = math.expm1(max(START.least_contrast, inside - outside)) / max(START.darkest_profile, there)
+    there, beyond = (
+        float(np.interp(0.5 * (a + b), _FRACTIONS, profile))
+        for a, b in ((along[0], START.inside), (START.outside, along[-1]))
+    )
+    contrast = _contrast(max(START.least_contrast, inside - outside), there, beyond)
     clipped = float(np.mean(light[:, core] > START.white)) > START.clipped_share
     doubts = START.clipped_contrasts if clipped else START.doubted_contrasts if thorough else (1.0,)
     # white over the surroundings; where a reference divides the light, it divides white too
     unlit = 1.0 if ground is None else float(np.median(ground[:, core])) + overview.floor
-    ceiling = (1.0 + overview.floor) / (unlit * math.exp(outside)) if clipped else math.inf
+    dark = math.exp(outside) / (1.0 + contrast * beyond)
+    ceiling = (1.0 + overview.floor) / (unlit * dark) if clipped else math.inf
     kept = valid[:, 1:].astype(float)
     steps = np.diff(log, axis=1) * kept
     blurred = np.convolve(profile, kernel, "same")
@@ -126,6 +134,13 @@ def _across(
         tried.append(np.abs(steps[:, None] - np.diff(np.log(model), axis=2) * kept[:, None]).sum(axis=2))
     left = min(tried, key=lambda sums: float(sums.min(axis=1).sum()))
     return Rays(spotlight, (middle + 0.5) * overview.step, curve[use], left, np.abs(steps).sum(axis=1))
+
+
+def _contrast(step: float, there: float, beyond: float) -> float:
+    """The spotlight over the ambient light, from the step of the log light between two values of the profile."""
+    # (1 + k there) / (1 + k beyond) = e^step; a step that no contrast makes is as one without any ambient light
+    ratio = math.exp(step)
+    return (ratio - 1.0) / max(START.darkest_profile, there - ratio * beyond)
 
 
 def _within(at: Array, curve: Array, profile: Array) -> Array:
@@ -157,6 +172,33 @@ def _profile(beam: Beam) -> Array:
     profile = Profile.of(beam)
     angle = _FRACTIONS * profile.half_angle
     return profile.value(np.cos(angle) if profile.cosine else -angle)
+
+
+def glowing(beam: Beam, deep: Deep | None, radius: float) -> Array:
+    """The profile of a patch of `radius` [mm] on the retina at `_FRACTIONS` of it, with light from under the retina."""
+    if deep is None:
+        return _profile(beam)
+    share = float(deep.shares.max())
+    kernel = deep.kernels[int(np.argmax(deep.shares))]
+    # patches are alike in steps of 5 %
+    steps = round(math.log(max(radius, 1e-3)) / 0.05)
+    return _glowing(beam, round(share, 3), tuple(kernel.parts.tolist()), round(kernel.length, 3), steps)
+
+
+@lru_cache(maxsize=256)
+def _glowing(beam: Beam, share: float, parts: tuple[float, ...], length: float, steps: int) -> Array:
+    local = _profile(beam)
+    coarse = np.linspace(0.0, _FRACTIONS[-1], 76)
+    middle = 0.5 * (coarse[1:] + coarse[:-1])
+    ring = coarse[1] - coarse[0]
+    light = np.interp(middle, _FRACTIONS, local)
+    deep = np.zeros(len(middle))
+    for part, width in zip(parts, length * WIDTHS / math.exp(0.05 * steps), strict=True):
+        # what a Gaussian makes of a ring of light, seen at another radius (Rice's distribution)
+        width = max(width, 0.5 * ring)
+        near = np.exp(-0.5 * np.square((middle[:, None] - middle) / width)) * i0e(middle[:, None] * middle / width**2)
+        deep += part * (near * middle * ring / width**2) @ light
+    return np.asarray((1.0 - share) * local + share * np.interp(_FRACTIONS, middle, deep))
 
 
 @lru_cache(maxsize=8)

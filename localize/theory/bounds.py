@@ -13,14 +13,16 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from conespot.localize.model.deep import Deep
 from conespot.localize.model.estimate import Estimate
-from conespot.localize.model.forward import Light, light, look, window
+from conespot.localize.model.forward import Light, Sight, light, look, window
 from conespot.localize.model.knowns import Knowns
 from conespot.localize.model.outline import distances
 from conespot.localize.model.prior import prior_rows
 from conespot.localize.model.profile import Profile
 from conespot.localize.model.quantity import Quantity, quantity
 from conespot.localize.model.solve import inverse
+from conespot.localize.model.view import Irradiance
 from conespot.localize.theory.settings import THEORY
 from conespot.scene.pose import Pose
 from conespot.scene.scene import Scene
@@ -80,8 +82,11 @@ def cramer_rao(
 
     Raises ValueError if the frame does not determine the pose (no patch in it, or nothing to hold a free quantity).
     """
+    estimate, knowns = Estimate(pose, scene), knowns.within(scene)
+    deep = Deep.of(scene)
+    if deep is not None:
+        return _glowing(estimate, deep, sensor, knowns)
     pixels = patch_pixels(scene, pose)
-    estimate = Estimate(pose, scene)
     size = estimate.pose_size
     here = _light(scene, pose, pixels, pose_size=size, changes=estimate.beam_changes(knowns.free))
     peak = float(np.quantile(here.value[here.value > 0.0], THEORY.peak_quantile)) if np.any(here.value > 0.0) else 0.0
@@ -91,11 +96,28 @@ def cramer_rao(
     rows = [gain * here.jacobian[:size]]
     rows.append(gain * here.jacobian[size:])
     rows += [gain * _difference(estimate, pixels, each)[None] for each in knowns.free if each.changes == "sight"]
-    nuisance = np.stack([gain * here.value, np.ones(here.value.size)])
-    jacobian = np.concatenate([*rows, nuisance])
-    information = (jacobian / (gain * here.value + sensor.background**2)) @ jacobian.T
-    count = size + len(knowns.free)
-    _, prior = prior_rows(estimate, scene, knowns)
+    return _bound(estimate, gain * here.value, np.concatenate(rows), sensor, knowns)
+
+
+def _glowing(estimate: Estimate, deep: Deep, sensor: Electrons, knowns: Knowns) -> Bound:
+    """`cramer_rao` where light comes back from under the retina, which is seen as far as it tells of that."""
+    scene, channel = estimate.scene, 0
+    margin = THEORY.glow_reach * deep.kernels[channel].reach(0.5) / scene.camera.pixel_pitch
+    pixels = patch_pixels(scene, estimate.pose, margin)
+    sight = look(scene, pixels)
+    seen = np.isfinite(sight.points[:, 0])
+    sight = Sight(*(field[seen] for field in vars(sight).values()))
+    value, rows = Irradiance(sight, pixels[seen], 1, estimate, knowns, seen[seen])(estimate)[channel]
+    gain = sensor.peak / float(np.quantile(value, THEORY.peak_quantile))
+    return _bound(estimate, gain * value, gain * rows, sensor, knowns)
+
+
+def _bound(estimate: Estimate, electrons: Array, rows: Array, sensor: Electrons, knowns: Knowns) -> Bound:
+    """The bound of a frame that shows `electrons` `[N]`, with their derivatives `[P, N]` by all that is free."""
+    size, count = estimate.pose_size, len(rows)
+    jacobian = np.concatenate([rows, np.stack([electrons, np.ones(electrons.size)])])
+    information = (jacobian / (electrons + sensor.background**2)) @ jacobian.T
+    _, prior = prior_rows(estimate, estimate.scene, knowns)
     information[:count, :count] += prior.T @ prior
     covariance = inverse(information)
     if np.any(np.diag(information) == 0.0) or not np.all(np.isfinite(covariance)):

@@ -44,6 +44,9 @@ class TheorySettings:
     #: pixels beyond the outlines that count [px], to tell offset from gain: half raises bounds by 3e-4, twice lowers
     #: them by 3e-4
     margin_px: float = 3.0
+    #: medians of the deep light's kernel beyond the outlines that count, where light comes back from under the retina:
+    #: half raises bounds by up to 1 %, three times as many lower them by up to 1 %
+    glow_reach: float = 1.0
     #: quantile of a patch's light that the sensor's peak stands for; the brightest pixel alone may be any. 0.998 or
     #: 0.9995 change bounds by 7e-4
     peak_quantile: float = 0.999

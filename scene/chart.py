@@ -13,30 +13,29 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from conespot.scene import Eye, Scene
+from conespot.scene.eye import Eye
+from conespot.scene.scene import Scene
 from conespot.scene.surface import Surface
 
 Array = NDArray[np.float64]
 Maps = NDArray[np.float32]
 
-#: side of a cell [mm]
-CELL = 0.02
-
 
 @dataclass(frozen=True, eq=False)
 class Chart:
-    """`side` x `side` cells of `CELL` mm about a direction `centre` `[3]` from the eye's centre, from -x and -y on."""
+    """`side` x `side` cells of `cell` mm about a direction `centre` `[3]` from the eye's centre, from -x and -y on."""
 
     eye: Eye
     surface: Surface
     centre: Array
     side: int
+    cell: float
 
     @classmethod
-    def about(cls, scene: Scene, point: Array, half: float) -> Chart:
+    def about(cls, scene: Scene, point: Array, half: float, cell: float) -> Chart:
         """The chart about a point `[3]` that reaches at least `half` [mm] to each side."""
         away = point - scene.eye.centre
-        return cls(scene.eye, scene.surface, away / np.linalg.norm(away), _even_length(2.0 * half / CELL))
+        return cls(scene.eye, scene.surface, away / np.linalg.norm(away), _even_length(2.0 * half / cell), cell)
 
     @functools.cached_property
     def radius(self) -> float:
@@ -67,7 +66,7 @@ class Chart:
     @functools.cached_property
     def cells(self) -> Array:
         """Directions of the cells' centres `[side, side, 3]`, rows along y."""
-        ticks = (np.arange(self.side) + 0.5 - self.side / 2.0) * CELL
+        ticks = (np.arange(self.side) + 0.5 - self.side / 2.0) * self.cell
         return self.directions(np.stack(np.meshgrid(ticks, ticks), axis=-1))
 
     @functools.cached_property
@@ -82,21 +81,21 @@ class Chart:
     def gathered(self, directions: Array, weights: Array) -> Array:
         """Weights `[N]` of unit directions `[N, 3]` as a density [1/mm2] `[side, side]`, each shared by four cells."""
         density = np.zeros(self.side**2)
-        for cell, share in self._shares(directions):
+        for cell, share in self.shares(directions):
             density += np.bincount(cell, share * weights, minlength=self.side**2)
-        return density.reshape(self.side, self.side) / CELL**2
+        return density.reshape(self.side, self.side) / self.cell**2
 
     def read(self, values: Maps, directions: NDArray[np.floating]) -> Maps:
         """Maps `[K, side, side]` in unit directions `[N, 3]`, between four cells each: `[K, N]`; 0 outside them."""
         found = np.zeros((len(values), len(directions)), np.float32)
-        for cell, share in self._shares(directions):
+        for cell, share in self.shares(directions):
             for layer, out in zip(values.reshape(len(values), -1), found, strict=True):
                 out += layer[cell] * share
         return found
 
-    def _shares(self, directions: NDArray[np.floating]) -> Iterator[tuple[NDArray[np.int32], NDArray[np.floating]]]:
+    def shares(self, directions: NDArray[np.floating]) -> Iterator[tuple[NDArray[np.int32], NDArray[np.floating]]]:
         """The four cells about each of the directions `[N, 3]`, and its share in them; 0 for those outside."""
-        x, y = np.moveaxis(self.places(directions), -1, 0) / directions.dtype.type(CELL) + (self.side - 1) / 2
+        x, y = np.moveaxis(self.places(directions), -1, 0) / directions.dtype.type(self.cell) + (self.side - 1) / 2
         column, row = np.floor(x).astype(np.int32), np.floor(y).astype(np.int32)
         right, up = x - column, y - row
         inside = (column >= 0) & (column < self.side - 1) & (row >= 0) & (row < self.side - 1)
