@@ -68,7 +68,7 @@ class EdgeSettings:
     #: show the retina without it, and how well they tell the gain (sigma of its logarithm): it is another place
     around: tuple[float, ...] = (2.5, 3.0, 3.5)
     around_points: int = 24
-    gain: float = 1.0
+    gain: float = 0.3
     #: longest step of the tip, in bins, and however small they are [mm]: within it an outline is nearly linear. No
     #: answer changes
     longest_step_bins: float = 3.0

@@ -38,7 +38,7 @@ class GlowSettings:
     """How finely deep light is worked out."""
 
     #: cells over the kernel's median radius
-    fineness: float = 5.0
+    fineness: float = 10.0
     #: cells a side, at most: patches far apart have coarser ones
     most_cells: int = 96
     #: beyond the outlines and what is looked at, where a fit may still move the patches [mm]
