@@ -1,9 +1,9 @@
 """Broken input, a great deal of it: `python benchmarks/fuzz.py`; docs/hostile_input.md has its last result.
 
-1,000 mutations of shipped campaigns and presets, 300 of CSV files, 300 of frames, 100 of run folders, each read in this
-process: it is valid, or refused in one sentence of the kind that ends in exit code 2. Anything else is a defect, as is
-one that takes 5 s by the clock, waiting or working, or 1 GB. With --command, N of each go through the command as well,
-each in a process of its own, whose start counts too; no command reads a frame.
+1,000 mutations of shipped campaigns and presets, 300 of CSV files, 300 of frames, 300 images and videos from outside,
+100 run folders, each read in this process: it is valid, or refused in one sentence of the kind that ends in exit code
+2. Anything else is a defect, as is one that takes 5 s by the clock, waiting or working, or 1 GB. With --command, N of
+each go through the command as well, each in a process of its own, whose start counts too; none reads a run's frame.
 """
 
 from __future__ import annotations
@@ -30,9 +30,11 @@ import numpy as np
 
 sys.path.insert(0, str(Path(__file__).parent.parent / "tests" / "cast"))
 from mutants import mutated_bytes, mutated_text
+from strangers_frames import scene_of, settings_of, strangers_file
 
 from conespot.campaigns.plan import make_plan
 from conespot.campaigns.schema import read_campaign
+from conespot.localize.frames.reader import read_frames
 from conespot.render.frame_file import frame_header, read_frame, write_frame
 from conespot.results import load_run, write_results
 from conespot.scene import InputError, load_scene
@@ -89,6 +91,17 @@ def frames(folder: Path, count: int, moment: random.Random) -> Made:
         broken = mutated_bytes(whole[:400], moment) + whole[400:] if head else mutated_bytes(whole, moment)
         (folder / "x.exr").write_bytes(broken)
         yield folder / "x.exr", lambda: read_frame(folder / "x.exr"), []
+
+
+def strangers_frames(folder: Path, count: int, moment: random.Random) -> Made:
+    """Images and videos from outside: broken, cut off, mislabelled, huge, or of another scene."""
+    for _ in range(count):
+        path, name = strangers_file(folder, moment)
+        written = folder / "x.csv"
+        command = ["localize", path.name, "--scene", "paper", *settings_of(name), "--csv", written.name]
+        yield path, lambda path=path, name=name: list(read_frames([path], scene_of(name))), command
+        written.unlink(missing_ok=True)
+        assert not list(folder.glob(".*.tmp")), "something was left half-written"
 
 
 def run_folders(folder: Path, count: int, moment: random.Random, run: Path) -> Made:
@@ -189,6 +202,7 @@ def by_command(arguments: list[str], folder: Path, seconds: float) -> tuple[str,
         return f"{name} took longer than {seconds:g} s", peak
     traced = any(line.startswith("Traceback") for line in lines)
     missed = name == "check" and code == 1 and last.startswith("campaign: ") and "expectations missed" in last
+    missed |= name == "localize" and code == 1 and len(lines) == 1 and "frames refused" in last  # it could be read
     if not traced and (code == 0 or missed):
         return "valid", peak
     # `report` names the damaged lines of a journal before it ends, `check` what was missed
@@ -249,6 +263,7 @@ def main() -> int:
             "YAML files": (1000, lambda n, moment: yaml_files(folder, n, moment)),
             "CSV files": (300, lambda n, moment: csv_files(folder, n, moment)),
             "frames": (300, lambda n, moment: frames(folder, n, moment)),
+            "images and videos": (300, lambda n, moment: strangers_frames(folder, n, moment)),
             "run folders": (100, lambda n, moment: run_folders(folder, n, moment, run)),
         }
         for kind, (most, make) in kinds.items():

@@ -8,6 +8,7 @@ import pandas as pd
 
 from conespot.results.check import expectation_table
 from conespot.results.error_tables import ERROR_TABLES, POWER, cells
+from conespot.results.near_wall import near_wall_table
 from conespot.results.precision import precision_table
 from conespot.results.reality_gap import reality_table
 from conespot.results.released import released_table
@@ -20,6 +21,7 @@ from conespot.results.white import white_table
 _FIRST: dict[str, Callable[[Run], Table | None]] = {"table_1": table_1, "reality_gap": reality_table}
 _LAST: dict[str, Callable[[Run], Table | None]] = {
     "precision": precision_table,
+    "near_wall": near_wall_table,
     "white": white_table,
     "released": released_table,
     "expectations": expectation_table,

@@ -8,7 +8,7 @@ from typing import Annotated, Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import BeforeValidator, Field, ValidationInfo
+from pydantic import BeforeValidator, Field, ValidationInfo, model_validator
 
 from conespot.scene.csv_lines import CsvLine, columns, csv_lines, within
 from conespot.scene.model import Model, Words, unknown_name
@@ -122,6 +122,37 @@ class Random(Volume):
         return self.at(rng.random((poses, 3)))
 
 
+class Shell(Model):
+    """Random tips near the wall of an eye of `radius`: evenly from `nearest` to `farthest` off it, and over its area.
+
+    They lie within `reach` of the posterior pole, along the wall. Of another shape than the sphere's the distances are
+    those from the sphere.
+    """
+
+    kind: Literal["shell"] = "shell"
+    radius: Length = Field(12.0, gt=0.0, le=100.0)
+    nearest: Length = Field(0.05, gt=0.0)
+    farthest: Length = Field(1.0, gt=0.0)
+    reach: Length = Field(2.0, ge=0.0)
+
+    @model_validator(mode="after")
+    def _inside(self) -> Shell:
+        if not self.nearest <= self.farthest < self.radius:
+            raise ValueError("nearest, farthest and radius must grow in this order")
+        if self.reach > math.pi * self.radius:
+            raise ValueError("reach goes round the eye; half its girth is the most")
+        return self
+
+    def positions(self, poses: int, rng: np.random.Generator) -> Array:
+        """Tip positions `[poses, 3]` [mm]."""
+        u = rng.random((poses, 3))
+        height = self.radius - (self.nearest + (self.farthest - self.nearest) * u[:, 0])
+        down = 1.0 - (1.0 - math.cos(self.reach / self.radius)) * u[:, 1]
+        across, turn = np.sqrt(1.0 - down * down), 2.0 * math.pi * u[:, 2]
+        direction = np.stack([across * np.cos(turn), across * np.sin(turn), -down], axis=-1)
+        return np.array([0.0, 0.0, self.radius]) + height[:, None] * direction
+
+
 class Waypoints(Model):
     """Tip positions from the columns x_mm, y_mm, z_mm of a CSV file, in its order; the first N of them are used.
 
@@ -179,7 +210,7 @@ def _millimetres(line: CsvLine, column: int) -> float:
 
 
 Trajectory = Annotated[
-    Box | Helix | Spiral | Line | Grid | Random | Waypoints,
+    Box | Helix | Spiral | Line | Grid | Random | Shell | Waypoints,
     Field(discriminator="kind"),
 ]
 KINDS: dict[str, type[Model]] = {
@@ -189,6 +220,7 @@ KINDS: dict[str, type[Model]] = {
     "line": Line,
     "grid": Grid,
     "random": Random,
+    "shell": Shell,
     "csv": Waypoints,
 }
 

@@ -16,6 +16,7 @@ import numpy as np
 from conespot.localize.frames.stored import Pixels, Stored, Transfer, Turn, check_size
 from conespot.scene.document import InputError
 from conespot.scene.exr import read_exr
+from conespot.scene.hushed import hushed
 from conespot.scene.scene import Scene
 from conespot.scene.text_file import read_bytes
 
@@ -138,14 +139,11 @@ def _tiff(name: str, raw: bytes, scene: Scene) -> Stored:
 
 
 def _unpacked(name: str, kind: str, raw: bytes) -> Pixels:
-    level = cv2.utils.logging.getLogLevel()
-    cv2.utils.logging.setLogLevel(cv2.utils.logging.LOG_LEVEL_SILENT)  # it would complain on stderr too
     try:
-        found = cv2.imdecode(np.frombuffer(raw, np.uint8), cv2.IMREAD_UNCHANGED)
+        with hushed():  # libpng and libtiff would complain on stderr too
+            found = cv2.imdecode(np.frombuffer(raw, np.uint8), cv2.IMREAD_UNCHANGED)
     except (cv2.error, MemoryError) as error:
         raise _broken(name, kind, error) from None
-    finally:
-        cv2.utils.logging.setLogLevel(level)
     if found is None:
         raise _broken(name, kind, None)
     pixels: Pixels = np.asarray(found)

@@ -49,6 +49,8 @@ def read_video(path: Path, scene: Scene) -> Iterator[tuple[float | None, Stored]
                 raise InputError(f"{path}: holds no video stream")
             stream = container.streams.video[0]
             context = stream.codec_context
+            if context is None:
+                raise InputError(f"{path}: holds a video of a kind that FFmpeg cannot unpack")
             context.options = {**context.options, "err_detect": "explode", "max_pixels": limits["max_pixels"]}
             size = (context.height, context.width)
             if size not in (scene.camera.shape, scene.camera.shape[::-1]):  # which turn it has, its frames say

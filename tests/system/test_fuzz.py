@@ -9,9 +9,11 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from mutants import mutated_bytes, mutated_text
+from strangers_frames import huge_files, scene_of, strangers_file
 
 from conespot.campaigns.plan import make_plan
 from conespot.campaigns.schema import read_campaign
+from conespot.localize.frames.reader import read_frames
 from conespot.render.frame_file import read_frame, write_frame
 from conespot.scene import InputError
 from conespot.scene.document import shipped
@@ -72,9 +74,26 @@ def test_a_frame_that_claims_more_than_it_can_hold_is_refused_before_it_is_unpac
             read_frame(tmp_path / "x.exr")
 
 
+@fuzz
+@given(st.randoms(use_true_random=False))
+def test_an_image_or_a_video_from_outside_is_read_or_refused(tmp_path, capfd, moment):
+    path, name = strangers_file(tmp_path, moment)
+    valid_or_refused(lambda: list(read_frames([path], scene_of(name))))
+    said = capfd.readouterr()
+    assert not said.err, "who reads it has one sentence, and no library has another"
+    assert not said.out
+
+
+@pytest.mark.parametrize("name", ["huge.png", "huge.tiff", "huge.jpg"])
+def test_a_picture_that_is_huge_by_its_header_is_refused_by_it(tmp_path, name):
+    (tmp_path / name).write_bytes(huge_files()[name])
+    with pytest.raises(InputError, match="12000 x 12000 px do not fit"):
+        list(read_frames([tmp_path / name], scene_of("eight.png")))
+
+
 @pytest.mark.slow
 def test_a_twentieth_of_the_fuzzing_and_the_command_find_no_defect():
-    """YAML, CSV, frames and damaged run folders, in a process and through the command."""
+    """YAML, CSV, frames, images, videos and damaged run folders, in a process and through the command."""
     script = Path(__file__).parents[2] / "benchmarks" / "fuzz.py"
     command = [sys.executable, str(script), "--seed", "5", "--share", "0.05", "--command", "3", "--seconds", "60"]
     done = subprocess.run(command, capture_output=True, text=True, timeout=600)

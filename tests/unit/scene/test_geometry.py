@@ -15,7 +15,7 @@ from conespot.scene.beam import CyclesBeam, HardBeam, LinearBeam, TabulatedBeam
 from conespot.scene.power import Power
 from conespot.scene.spotlights import RIGS, spotlight_axes
 from conespot.scene.surface import Bump, Surface, bump_grid
-from conespot.scene.trajectory import Box, Grid, Helix, Line, Random, Spiral
+from conespot.scene.trajectory import Box, Grid, Helix, Line, Random, Shell, Spiral
 
 RNG = np.random.default_rng(0)
 BEAMS = [
@@ -187,3 +187,14 @@ def test_a_tip_outside_the_eye_is_refused():
         Scene().pose(np.array([0.0, 0.0, -0.1]))
     with pytest.raises(ValueError, match="outside the eye"):
         Scene(surface=Surface(bumps=(Bump(x=0.0, y=0.0),))).pose(np.array([0.0, 0.0, 0.05]))
+
+
+def test_tips_of_a_shell_lie_evenly_between_two_distances_from_the_wall_and_over_its_area():
+    tips = Shell(radius=12.0, nearest=0.05, farthest=1.0, reach=2.0).positions(4000, np.random.default_rng(1))
+    offset = tips - [0.0, 0.0, 12.0]
+    out = np.linalg.norm(offset, axis=1)
+    assert 11.0 <= out.min() < out.max() <= 11.95
+    assert np.mean(12.0 - out) == pytest.approx(0.525, abs=0.02)
+    arc = 12.0 * np.arccos(-offset[:, 2] / out)
+    assert arc.max() <= 2.0 + 1e-9
+    assert np.mean(arc < np.sqrt(2.0)) == pytest.approx(0.5, abs=0.03)  # half the radius squared, half the area
