@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -52,23 +52,31 @@ class Bench:
 
     def measure(self, unit: Unit) -> Record:
         """Render the unit's pose once, expose it at every power, localize every frame with every localizer."""
+        findings = [
+            found for case, image, unlit in self.given(unit) for found in self.findings(unit, case, image, unlit)
+        ]
+        return Record(unit=unit.key, by=self._by, findings=tuple(findings))
+
+    def given(self, unit: Unit) -> Iterator[tuple[Case, AnyImage, Reference | None]]:
+        """Of every case of a unit, what its localizers are given: the image, gone when the next case comes, and unlit.
+
+        The pose is rendered once, and exposed at every power.
+        """
         group = self._plan.groups[unit.group]
         pose = group.pose(unit.pose)
         exposure, background = self._exposure(group, pose)
         tiles = self._tiles(self._scene(group)[0], unit)
-        findings = []
         for _, alike in itertools.groupby(group.cases, key=lambda case: case.frame):
             cases = list(alike)
             power = cases[0].scene.power.value
             with exposure.shown(tiles, power, frame_seed(unit, cases[0])) as image:
                 for case in cases:
-                    findings += self._findings(unit, case, image, self._unlit(unit, case, exposure, tiles))
+                    yield case, image, self._unlit(unit, case, exposure, tiles)
                 if self._frames is not None:
                     radiance = background.copy()
                     for tile in tiles:
                         radiance[tile.crop.slices] += np.float32(power) * tile.radiance
                     self._keep(f"{cases[0].frame}-{unit.pose:05d}", cases[0], pose, radiance, image)
-        return Record(unit=unit.key, by=self._by, findings=tuple(findings))
 
     def look(self, unit: Unit, case: Case) -> tuple[AnyImage, dict[str, Outcome]]:
         """One case's frame of a unit, and what each of its localizers answers: what `measure` makes its findings of."""
@@ -89,7 +97,7 @@ class Bench:
             exposure = Exposure(background, exposure.sensor)
         return exposure, background
 
-    def _findings(self, unit: Unit, case: Case, image: AnyImage, unlit: Reference | None) -> list[Finding]:
+    def findings(self, unit: Unit, case: Case, image: AnyImage, unlit: Reference | None) -> list[Finding]:
         """What the case's localizers find in a frame."""
         bound = self._bound(case, self._plan.groups[unit.group].pose(unit.pose))
         found = []

@@ -6,7 +6,7 @@ import argparse
 from collections.abc import Callable
 from pathlib import Path
 
-from conespot.campaigns import new_microscope, subcommands
+from conespot.campaigns import new_microscope, other_methods, subcommands
 from conespot.campaigns.ending import Ending
 from conespot.campaigns.machines import add_machines, add_workers
 from conespot.campaigns.new_campaign import QUESTIONS
@@ -127,6 +127,20 @@ def _add_own(add: _Add) -> None:
     add_set(calibrate)
 
 
+def _add_others(add: _Add) -> None:
+    """What lets other people's methods be compared."""
+    export = add(
+        other_methods.export, "write a run's frames and what localizers are told, without the truth, for any method"
+    )
+    export.add_argument("folder", type=Path, metavar="RUN")
+    export.add_argument("--frames", type=Path, metavar="FOLDER", required=True, help="where to write; goes on if begun")
+    add_workers(export)
+    score = add(other_methods.score, "join what another method found in exported frames to a run's rows and tables")
+    score.add_argument("folder", type=Path, metavar="RUN")
+    score.add_argument("estimates", type=Path, metavar="ESTIMATES", help="a CSV: frame,x_mm,y_mm,z_mm, an axis or none")
+    score.add_argument("--name", required=True, help="what the method is called in tables")
+
+
 def _add_results(add: _Add) -> None:
     """What compares, looks into or hands on what was found."""
     pack = add(subcommands.pack, "make one archive of a run, with checksums, that others can check and go on with")
@@ -150,6 +164,7 @@ def _add_results(add: _Add) -> None:
     check.add_argument("--campaign", metavar="FILE", help="expect what this campaign does (default: the run's own)")
     check.add_argument("--junit", type=Path, metavar="FILE", help="write the verdicts as JUnit XML")
     check.add_argument("--markdown", type=Path, metavar="FILE", help="write the verdicts as a markdown table")
+    _add_others(add)
     debug = add(subcommands.debug, "render one pose of a run again, and draw what its localizers saw")
     debug.add_argument("folder", type=Path, metavar="RUN")
     debug.add_argument("case", metavar="CASE", help="its key, the beginning of it, or its line in cases.jsonl")

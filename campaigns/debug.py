@@ -11,11 +11,10 @@ from typing import TYPE_CHECKING
 
 import pandas as pd
 
+from conespot.campaigns.begun import plan_of
 from conespot.campaigns.ending import RunError
-from conespot.campaigns.plan import Case, Group, Plan, Unit, make_plan
+from conespot.campaigns.plan import Case, Group, Plan, Unit
 from conespot.campaigns.row import Finding, Record, Row, errors
-from conespot.campaigns.schema import read_campaign
-from conespot.campaigns.store import goes_on, read_begun_with
 from conespot.campaigns.worker import Done, Lost, Measures, Note, Refused, Worker
 from conespot.results.run import load_run
 from conespot.results.variants import named
@@ -31,7 +30,7 @@ def debug(folder: Path, wanted: str, pose: int) -> Iterator[str]:
     Writes frame.png and a picture for each localizer into RUN/debug/CASE-POSE. Raises InputError for what is no run of
     this version, no case or no pose of it, RunError if it cannot be rendered.
     """
-    plan = _plan_of(folder)
+    plan = plan_of(folder)
     group, case = _case(plan, wanted, folder)
     if not 0 <= pose < len(group.positions):
         raise InputError(f"pose {pose}: the case has poses 0 to {len(group.positions) - 1}")
@@ -54,15 +53,6 @@ def debug(folder: Path, wanted: str, pose: int) -> Iterator[str]:
         row = errors(truth, found, case.scene.instrument.rcm)
         yield f"{found.localizer}: {_words(found, row)}; {_beside(found, row, kept.get(found.localizer))}"
     yield f"{pictures}: {', '.join(sorted(path.name for path in pictures.glob('*.png')))}"
-
-
-def _plan_of(folder: Path) -> Plan:
-    if not (folder / "campaign.yaml").is_file():
-        raise InputError(f"{folder}: no such run folder; `campaign run NAME --out {folder}` makes one")
-    begun_with = read_begun_with(folder)
-    if not goes_on(begun_with):
-        raise InputError(f"{folder}: was begun by conespot {begun_with.get('conespot')}, which named cases otherwise")
-    return make_plan(read_campaign(str(folder / "campaign.yaml")))
 
 
 def _case(plan: Plan, wanted: str, folder: Path) -> tuple[Group, Case]:

@@ -71,6 +71,11 @@ class Knowledge(Model):
         return self
 
     @property
+    def drawn_anew(self) -> bool:
+        """Whether every pose is told a scene of its own."""
+        return any((self.rcm_error, self.half_angle_error, self.eye_radius_error, self.camera_height_error))
+
+    @property
     def knowns(self) -> Knowns:
         """What a localizer may assume of the scene that it is told."""
         angle = self.half_angle_sigma

@@ -26,6 +26,7 @@ from conespot.campaigns.row import Record, Stated
 from conespot.campaigns.row_table import row_table
 from conespot.campaigns.row_text import csv_text
 from conespot.campaigns.schema import resolved
+from conespot.campaigns.scores import Scores
 from conespot.campaigns.standing import FILE as STANDING
 from conespot.campaigns.standing import Count, Standing
 from conespot.results.makers import FILE as MAKERS
@@ -106,12 +107,19 @@ class Store:
             write_atomically(self.folder / STANDING, standing.model_dump_json().encode())
 
     def rows(self) -> pd.DataFrame:
-        """The rows of what is finished, in the plan's order."""
+        """The rows of what is finished, in the plan's order, with what other methods found (campaigns.scores).
+
+        Raises InputError for scores that are damaged.
+        """
         stated = Stated.by(entry.stated for entry in self.entries.values())
-        return row_table(self.plan, self.entries, self.record, stated)
+        scores = Scores.of(self.folder, self.plan)
+        return row_table(scores.plan, self.entries, lambda unit: scores.joined(self.record(unit)), stated)
 
     def write_rows(self) -> int:
-        """Write errors.csv and errors.parquet of what is finished, in the plan's order, who made it; how many rows."""
+        """Write errors.csv and errors.parquet of what is finished, in the plan's order, who made it; how many rows.
+
+        What other methods found in exported frames (campaigns.scores) is among them. Raises InputError.
+        """
         if not self.entries:
             return 0
         frame = self.rows()

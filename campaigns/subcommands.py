@@ -107,7 +107,7 @@ def report(options: argparse.Namespace) -> Ending:
     from conespot.campaigns.session import report
 
     report(options.folder)
-    _say_results(options.folder)
+    say_results(options.folder)
     return Ending.DONE
 
 
@@ -120,7 +120,7 @@ def merge(options: argparse.Namespace) -> Ending:
     for sentence in merged.damage:
         _fail(sentence, Ending.FAILED)
     finish(options.out)
-    _say_results(options.out)
+    say_results(options.out)
     return _fail(merged.sentence, Ending.FAILED) if merged.missing else Ending.DONE
 
 
@@ -266,11 +266,12 @@ def _end(session: Session) -> Ending:
     """Say how a session ended."""
     if session.interrupted:
         return _fail(session.interrupted, Ending.INTERRUPTED)
-    _say_results(session.folder)
+    say_results(session.folder)
     return _fail(session.sentence, Ending.FAILED) if session.lost else Ending.DONE
 
 
-def _say_results(folder: Path) -> None:
+def say_results(folder: Path) -> None:
+    """Say the tables of a run folder, and what else it holds."""
     from conespot.results import tables_text
 
     _mention(tables_text(folder))
