@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import os
 from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
@@ -32,6 +33,21 @@ def _pixels(text: str) -> str:
     if len(sides) != 2 or not all(side.isascii() and side.isdecimal() and 8 <= int(side) <= 20_000 for side in sides):
         raise ValueError(f"expected columns and rows such as 1920x1080, got {text!r}")
     return f"[{int(sides[0])}, {int(sides[1])}]"
+
+
+def _number(low: float, high: float) -> Callable[[str], str]:
+    """A check of a plain number between two bounds."""
+
+    def check(text: str) -> str:
+        try:
+            value = float(text)
+        except ValueError:
+            value = math.nan
+        if not low <= value <= high:
+            raise ValueError(f"expected a number from {low:g} to {high:g}, got {text!r}")
+        return f"{value:g}"
+
+    return check
 
 
 def _bits(text: str) -> str:
@@ -83,6 +99,12 @@ QUESTIONS = (
         "alignment", "where they stand in the 16 of a file: right (12 bits end at 4095) or left", "right",
         choices=lambda: ("right", "left"),
     ),
+    Question("black", "pixel value without light", "0", metavar="VALUE", check=_number(0.0, 60_000.0)),
+    Question(
+        "electrons", "electrons that fill a pixel to its largest value (the camera's full well)", "10000", metavar="N",
+        check=_number(10.0, 1e7),
+    ),
+    Question("read-noise", "its noise in the dark, in electrons", "15", metavar="N", check=_number(0.0, 1e4)),
     Question(
         "range", "range of a video recorder's codes: none recorded, full (0 to 255) or limited (16 to 235)", NONE,
         choices=lambda: (NONE, "full", "limited"),
@@ -166,15 +188,25 @@ def _camera(path: Path, answers: Mapping[str, str]) -> Iterator[str]:
 
 
 def _sensor(answers: Mapping[str, str]) -> Iterator[str]:
-    camera = {
-        "linear": f"{{kind: linear, bits: {answers['bits']}}}",
-        "srgb": "srgb8",
-        "srgb-colour": "srgb8-colour",
-    }[answers["values"]]
-    if answers["range"] == NONE:
-        yield f"sensor: {camera} # what a pixel value means"
-    else:
-        yield f"sensor: {{kind: recorded, camera: {camera}, range: {answers['range']}}} # a camera behind a recorder"
+    linear = answers["values"] == "linear"
+    full, black = 2 ** int(answers["bits"]) - 1, float(answers["black"])
+    gain = (full - black) / float(answers["electrons"])
+    inner = "  " if linear else "    "
+    yield "sensor: # noise as EMVA 1288 states it of a camera; without it no sigma of a real frame holds"
+    if not linear:
+        yield "  kind: recorded # eight bits with the sRGB transfer"
+        span, quality = ("full", 100) if answers["range"] == NONE else (answers["range"], 90)
+        yield f"  range: {span} # of codes: full is 0 to 255, limited 16 to 235"
+        yield f"  quality: {quality} # of its compression, as JPEG counts"
+        yield "  camera:"
+    yield f"{inner}kind: emva # proportional to light"
+    chip = "rgb # red, green and blue" if answers["values"] == "srgb-colour" else "mono # grey"
+    yield f"{inner}chip: cmv12000-{chip}"
+    yield f"{inner}bits: {answers['bits']}"
+    yield f"{inner}black_level: {black:g} # value without light"
+    yield f"{inner}gain: {gain:.6g} # of a value an electron"
+    yield f"{inner}full_well: {answers['electrons']} # electrons"
+    yield f"{inner}read_noise: {answers['read-noise']} # electrons"
     yield "storage: # what files leave open; a frame that does not fit is refused with the key to write here"
     yield f"  alignment: {answers['alignment']} # where the sensor's bits stand in the 16 of a file"
     yield "  #turned: 90 # clockwise, after what the file itself says"

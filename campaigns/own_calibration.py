@@ -12,9 +12,8 @@ from pathlib import Path
 from conespot.campaigns.answers import can_hold
 from conespot.campaigns.knowledge import Knowledge
 from conespot.campaigns.own_scene import described_scene
-from conespot.localize.calibration import NAMES, Calibration, Width, calibrate
+from conespot.localize.calibration import NAMES, QUANTITIES, Calibration, Width, calibrate
 from conespot.localize.frames.reader import read_frames
-from conespot.localize.model.quantity import QUANTITIES
 from conespot.scene import InputError, Scene
 from conespot.scene.atomic import write_atomically
 from conespot.scene.document import Document, dump, find_document, read_value

@@ -14,7 +14,7 @@ from conespot.localize.frames.reader import read_frames
 from conespot.localize.image import Reference
 from conespot.localize.locate import LOCALIZERS, find_localizer, locate
 from conespot.localize.model.knowns import Knowns
-from conespot.scene import InputError
+from conespot.scene import InputError, Scene
 from conespot.scene.quantity import parse_quantity
 
 
@@ -62,14 +62,26 @@ class OwnFrames:
             yield Answer.of(frame, outcome, alarm)
 
 
-def make_alarm(distance: str | None, false_safe: float) -> Alarm | None:
-    """The alarm of two options; None without one. Raises InputError."""
+def make_alarm(distance: str | None, false_safe: float, scene: Scene) -> Alarm | None:
+    """The alarm of two options; None without one. Raises InputError, also for a scene whose camera has no noise."""
     if distance is None:
         return None
+    if note := noiseless(scene):
+        raise InputError(f"--alarm: {note}")
     try:
         return Alarm(parse_quantity(distance, "length", bare=False), false_safe)
     except ValueError as error:
         raise InputError(f"--alarm: {error}") from None
+
+
+def noiseless(scene: Scene) -> str:
+    """What makes every sigma too small, in words: a camera that is described without its noise; empty if it is not."""
+    if scene.sensor.noise.electrons is not None:
+        return ""
+    return (
+        f"scene.sensor ({scene.sensor.camera.kind}) has no noise but rounding, so that no sigma holds of a real"
+        " camera's frames; describe it as kind: emva, with gain and read_noise"
+    )
 
 
 def outputs(
@@ -91,6 +103,8 @@ def localize(
 ) -> Iterator[str]:
     """The lines of the table for people, as the frames come; `count` is counted up, and the outputs are written."""
     table = Table(alarm)
+    if note := noiseless(own.scene):
+        yield f"note: {note}"
     yield from table.head()
     for answer in own.answers(sources, alarm):
         count.frames += 1

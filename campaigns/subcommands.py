@@ -183,7 +183,7 @@ def localize(options: argparse.Namespace) -> Ending:
     from conespot.campaigns.own_frames import Count, OwnFrames, localize, make_alarm, outputs
 
     own, count = OwnFrames(options.scene, options.set, options.localizer), Count()
-    alarm = make_alarm(options.alarm, options.false_safe)
+    alarm = make_alarm(options.alarm, options.false_safe, own.scene)
     if options.reference:
         own.learn(options.reference)
     beside = outputs(own, alarm, csv=options.csv, json=options.json, overlay=options.overlay)

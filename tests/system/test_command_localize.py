@@ -18,7 +18,7 @@ MY_YAML = """\
 preset: paper
 camera: {resolution: 400}
 beam: {kind: hard, half_angle: 9 deg}
-sensor: {kind: linear, white: 1 W/m2/sr}
+sensor: {kind: emva, bits: 12, gain: 0.364, black_level: 0, full_well: 11250, read_noise: 15}
 knowledge: {rcm_sigma: 0.02 mm}
 """
 
@@ -92,6 +92,10 @@ def test_a_frame_that_does_not_fit_is_one_sentence_and_nothing_is_written(own, t
         (["--localizer", "paper-code-oracle"], "needs the true pose, which your own frames lack"),
         (["--localizer", "con"], "did you mean 'cone'?"),
         (["--alarm", "0.1"], "--alarm: "),
+        (
+            ["--alarm", "0.1 mm", "--set", "scene.sensor=linear"],
+            "--alarm: scene.sensor (linear) has no noise but rounding",
+        ),
         (["--alarm", "0.1 mm", "--false-safe", "0.9"], "must lie between 0 and 0.5"),
         (["--csv", "no/such/x.csv"], "its folder does not exist; choose another --csv"),
         (["--set", "poses=3"], "--set poses: localize is about a scene alone"),
@@ -147,7 +151,7 @@ def test_what_a_sequence_does_not_show_stays_as_it_was_and_is_said_with_what_wou
 
 @pytest.mark.slow
 def test_three_spotlights_give_the_half_angle_back_and_the_next_command_takes_it(own, tmp_path):
-    """Told 9 deg, which are 9.03; four frames of 500 px."""
+    """Told 9 deg, which are 9.03; four frames of 500 px, within four of the sigmas that are stated."""
     scene = scene_of(HardBeam(half_angle=math.radians(9.03)), "triple", resolution=500)
     found, text = calibrated(tmp_path, own, scene, "--set", "scene.spotlights=triple", rays=8)
     assert math.degrees(found.beam.half_angle) == pytest.approx(9.03, abs=5e-3)

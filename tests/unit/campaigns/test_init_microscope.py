@@ -4,7 +4,8 @@ import pytest
 
 from conespot.campaigns.command import main
 from conespot.campaigns.own_scene import described_scene
-from conespot.scene.sensor import Linear, Recorded
+from conespot.scene.emva import Emva
+from conespot.scene.sensor import Recorded
 
 CALIBRATION = """%YAML:1.0
 ---
@@ -30,22 +31,26 @@ def test_the_defaults_are_a_scene_whose_row_shows_the_field_that_was_asked_for(t
     left, right = scene.camera.rays([[0.0, 540.0], [1920.0, 540.0]]).directions
     assert 110.0 * (right[0] / -right[2] - left[0] / -left[2]) == pytest.approx(13.2)
     assert scene.camera.size_words == "1920 x 1080 px"
-    assert scene.sensor == Linear(bits=12)
+    assert isinstance(scene.sensor, Emva)
+    assert (scene.sensor.full_scale, scene.sensor.black_level, scene.sensor.read_noise) == (4095, 0.0, 15.0)
+    assert scene.sensor.saturation == pytest.approx(10_000.0)
     assert knowledge.rcm_sigma == pytest.approx(0.05)
     assert max(map(len, (tmp_path / "my_microscope.yaml").read_text().splitlines())) <= 120
 
 
 def test_every_answer_arrives():
     options = {
-        "pixels": "640x480", "field": "8 mm", "distance": "180 mm", "values": "srgb", "range": "limited",
-        "radius": "11.5 mm", "trocar": "5 mm, 1 mm, 21 mm", "trocar-sigma": "20 um", "rig": "triple",
-        "half-angle": "7 deg", "edge": "soft", "alignment": "left",
+        "pixels": "640x480", "field": "8 mm", "distance": "180 mm", "values": "srgb-colour", "range": "limited",
+        "electrons": "5000", "radius": "11.5 mm", "trocar": "5 mm, 1 mm, 21 mm", "trocar-sigma": "20 um",
+        "rig": "triple", "half-angle": "7 deg", "edge": "soft", "alignment": "left",
     }  # fmt: skip
     scene, knowledge = written(*[part for name, value in options.items() for part in (f"--{name}", value)])
     assert scene.camera.shape == (480, 640)
     assert scene.camera.height == 180.0
     assert isinstance(scene.sensor, Recorded)
     assert scene.sensor.range == "limited"
+    assert scene.sensor.camera.saturation == pytest.approx(5000.0)
+    assert scene.sensor.responses.keys() == {"red", "green", "blue"}
     assert scene.eye.radius == 11.5
     assert scene.instrument.rcm == (5.0, 1.0, 21.0)
     assert knowledge.rcm_sigma == pytest.approx(0.02)
