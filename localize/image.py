@@ -24,7 +24,10 @@ Signal = NDArray[np.float32]  #: light, 1 is white
 def checked(image: ArrayLike, scene: Scene) -> AnyImage:
     """The image `[H, W]` or `[H, W, 3]` as an array that belongs to the scene's camera.
 
-    Raises InputError for another shape or data type, NaN or infinite pixels, and a size other than the camera's.
+    Floats above 1.0 are as white as a pixel can be, and count as clipped.
+
+    Raises InputError for another shape or data type, NaN or infinite pixels, a size other than the camera's, and
+    values that the sensor does not have: above its full scale, or white at a multiple of a power of two below it.
     """
     array = np.asarray(image)
     kind_known = array.dtype in (np.uint8, np.uint16) or np.issubdtype(array.dtype, np.floating)
@@ -38,9 +41,31 @@ def checked(image: ArrayLike, scene: Scene) -> AnyImage:
             f"image: {width} x {height} px do not fit scene.camera.resolution = {scene.camera.size_words}; "
             "give the whole frame, or the scene of the camera that took it"
         )
-    if array.dtype.kind == "f" and not np.isfinite(array).all():
-        raise InputError("image: has pixels that are NaN or infinite; mask or repair them first")
+    if array.dtype.kind == "f":
+        if not np.isfinite(array).all():
+            raise InputError("image: has pixels that are NaN or infinite; mask or repair them first")
+        return np.minimum(array, 1.0) if float(array.max(initial=0.0)) > 1.0 else array
+    if array.dtype == np.uint16:
+        _check_values(array, scene.sensor.full_scale)
     return array
+
+
+def _check_values(array: AnyImage, full: int) -> None:
+    """Raises InputError for whole numbers of 16 bits that are not those of a sensor whose white is `full`."""
+    most = int(array.max(initial=0))
+    if most > full:
+        raise InputError(
+            f"image: values up to {most} do not fit scene.sensor, whose white is {full}; write its true bits, or shift"
+            f" values that are left-aligned in 16 bits to the right (scene.storage: {{alignment: left}} for files)"
+        )
+    # white that is rounded down to a multiple of 2, 4, ... would not be known as clipped
+    unit = (full + 1) - most
+    if unit > 1 and unit & (unit - 1) == 0 and most > full // 2 and not int(np.bitwise_or.reduce(array, None)) % unit:
+        bits = (full + 1).bit_length() - unit.bit_length()
+        raise InputError(
+            f"image: all values are multiples of {unit}, so that white is {most} and not scene.sensor's {full}; divide"
+            f" them by {unit} and write scene.sensor.bits: {bits} (scene.storage: {{alignment: left}} for files)"
+        )
 
 
 @dataclass(frozen=True, eq=False)

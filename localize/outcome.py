@@ -13,6 +13,7 @@ Array = NDArray[np.float64]
 #: reasons of more than one stage; a reason is counted by its text, so it carries no numbers
 COVERED: Final = "too little of the patch is in the frame"
 UNCERTAIN: Final = "too uncertain: the patch and what is known do not hold the tip within the limit"
+OUTSIDE: Final = "the tip would be outside the eye"
 #: reasons of the published methods
 NOTHING_FOUND: Final = "nothing found: no patch stands out of the background"
 FEWER_PATCHES: Final = "fewer patches than spotlights"

@@ -12,13 +12,12 @@ from conespot.localize.distance import distance_of
 from conespot.localize.model.estimate import Estimate
 from conespot.localize.model.knowns import Knowns
 from conespot.localize.model.prior import rcm_miss
-from conespot.localize.outcome import COVERED, UNCERTAIN, Localization, LocalizationFailure, Outcome
+from conespot.localize.outcome import COVERED, OUTSIDE, UNCERTAIN, Localization, LocalizationFailure, Outcome
 from conespot.scene.scene import Scene
 
 Array = NDArray[np.float64]
 MISSES_RCM = "the axis misses the remote centre of motion by more than both their errors allow"
 MISFIT = "the light in the patch contradicts the model of the beam"
-OUTSIDE = "the fitted tip is outside the eye"
 BEHIND = "the fitted tip is behind the remote centre of motion"
 UNSETTLED = "the fit does not settle"
 

@@ -16,6 +16,7 @@ from conespot.localize.outcome import (
     NEAR_CIRCLE,
     NO_ELLIPSE,
     NO_INTERSECTION,
+    OUTSIDE,
     Localization,
     LocalizationFailure,
     Outcome,
@@ -55,6 +56,7 @@ class Method:
         found = outlines(self.segment(grey8(image, scene)), len(scene.spotlights))
         if isinstance(found, LocalizationFailure):
             return found
+        told = scene
         patches, scene = as_the_paper_sees(found, scene)
         pairs: list[Candidates] = []
         for patch in patches:
@@ -71,6 +73,9 @@ class Method:
         else:
             positions = least_spread(np.stack([pair.apexes for pair in pairs]))
         apex = self.unite(positions, axis=0)
+        if not told.depth(apex) > 0.0:
+            # what no needle in the eye can light is no spotlight: a disc, a rim, the frame's own shading
+            return LocalizationFailure(OUTSIDE)
         spread = float(np.sqrt(np.mean(np.sum((positions - positions.mean(axis=0)) ** 2, axis=-1))))
         axis = Pose.through(apex, scene.instrument.rcm).axis
         return Localization(apex, axis, spread_mm=spread if len(pairs) > 1 else None)

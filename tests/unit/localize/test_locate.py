@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 from conespot.localize import LOCALIZERS, Localization, LocalizationFailure, locate
-from conespot.localize.outcome import CUT_BY_BORDER, FEWER_PATCHES, NEAR_CIRCLE, NO_INTERSECTION, NOTHING_FOUND
+from conespot.localize.outcome import CUT_BY_BORDER, FEWER_PATCHES, NEAR_CIRCLE, NO_INTERSECTION, NOTHING_FOUND, OUTSIDE
 from conespot.scene import Eye, InputError
 from conespot.scene.sensor import Linear
 from conespot.scene.spotlights import Instrument
@@ -104,6 +104,50 @@ def test_the_image_is_left_as_it_was(image, scene):
 def test_an_image_that_cannot_be_used_is_refused_in_a_sentence(scene, broken, said):
     with pytest.raises(InputError, match=said):
         locate(broken, scene)
+
+
+def lit_to(white):
+    """A frame of whole numbers with a clipped disc of `white`, over a ramp of multiples of 16."""
+    y, x = np.mgrid[:1000, :1000]
+    ramp = ((x + y) * 16).astype(np.uint16)
+    ramp[np.hypot(x - 500, y - 500) < 80] = white
+    return ramp
+
+
+@pytest.mark.parametrize(
+    ("bits", "white", "said"),
+    [
+        (12, 65520, "values up to 65520 do not fit scene.sensor, whose white is 4095"),
+        (16, 65520, "all values are multiples of 16, so that white is 65520 .* write scene.sensor.bits: 12"),
+        (16, 65535, None),
+    ],
+)
+def test_values_that_are_not_the_sensors_are_refused_and_never_cut_off(frames, bits, white, said):
+    scene = frames.make_scene(sensor=Linear(bits=bits))
+    if said is None:
+        assert locate(lit_to(white), scene, "paper") is not None
+        return
+    with pytest.raises(InputError, match=said):
+        locate(lit_to(white), scene, "paper")
+
+
+@pytest.mark.parametrize("name", ["paper", "photometric"])
+def test_light_above_white_counts_as_white(frames, name):
+    scene = frames.make_scene(sensor=Linear(bits=12))
+    light = frames.frame(scene, scene.pose(TIP)).astype(float) / 4095.0
+    light[light > 0.5 * light.max()] = 1.0
+    bright = np.where(light == 1.0, 700.0, light)
+    found, clipped = locate(bright, scene, name), locate(light, scene, name)
+    assert found
+    np.testing.assert_array_equal(found.apex_mm, clipped.apex_mm)
+
+
+@pytest.mark.parametrize("name", PUBLISHED)
+def test_no_published_method_answers_with_a_tip_outside_the_eye(scene, name):
+    """A patch so wide that its cone would begin above the eye."""
+    y, x = np.mgrid[:1000, :1000]
+    wide = np.where(np.hypot((x - 500) / 420, (y - 500) / 390) < 1.0, 200, 0).astype(np.uint8)
+    assert locate(wide, scene, name).reason == OUTSIDE
 
 
 @pytest.mark.parametrize(
