@@ -17,6 +17,7 @@ from conespot.localize.model.knowns import RCM_SIGMA_MM, Knowns
 from conespot.scene import Scene
 from conespot.scene.model import Model, Words
 from conespot.scene.quantity import Angle, Length, format_quantity
+from conespot.scene.retina import Fundus, Spread
 from conespot.scene.surface import AnySurface
 
 FREE = "free"
@@ -44,8 +45,9 @@ class Knowledge(Model):
     """Errors (standard deviations of what is told) and sigmas (what a localizer may assume); `free` is not known.
 
     `rcm` is in mm along each axis, the others are in their own unit. `surface` is what the localizers are told in
-    place of the true one. `reference` is how many frames without spotlights they are given, averaged; `sequence` from
-    how many of the trajectory's own frames, evenly spread, they learn the same view.
+    place of the true one. Without `spread_told` they are told that no light spreads under the retina; `spread_error` is
+    of the logarithms of its amount and of how far it goes. `reference` is how many frames without spotlights they are
+    given, averaged; `sequence` from how many of the trajectory's own frames, evenly spread, they learn the same view.
     """
 
     rcm_error: Length = Field(0.0, ge=0.0)
@@ -59,6 +61,8 @@ class Knowledge(Model):
     semi_axes_sigma: LengthSigma = 0.0
     relief_sigma: Length = Field(0.0, ge=0.0)
     surface: AnySurface | None = None
+    spread_told: bool = True
+    spread_error: float = Field(0.0, ge=0.0, le=2.0)
     reference: int = Field(0, ge=0, le=1000, strict=True)
     sequence: int = Field(0, ge=0, le=1000, strict=True)
 
@@ -106,4 +110,13 @@ class Knowledge(Model):
             update["camera"] = scene.camera.model_copy(update={"height": height})
         if self.surface is not None:
             update["surface"] = self.surface
+        if isinstance(scene.retina, Fundus) and scene.retina.spread is not None:
+            update["retina"] = scene.retina.model_copy(update={"spread": self._spread(scene.retina.spread, rng)})
         return scene.model_copy(update=update)
+
+    def _spread(self, true: Spread, rng: np.random.Generator) -> Spread | None:
+        """What is told of light under the retina."""
+        if not self.spread_told:
+            return None
+        amount, length = np.exp(self.spread_error * rng.standard_normal(2)).tolist()
+        return true.model_copy(update={"amount": true.amount * amount, "length": true.length * length})
