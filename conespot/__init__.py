@@ -9,6 +9,8 @@ TYPE_CHECKING = False  # `typing` and `importlib` take longer to import than all
 if TYPE_CHECKING:
     from conespot.campaigns.session import run_campaign
     from conespot.localize.calibration import calibrate
+    from conespot.localize.distance import Alarm
+    from conespot.localize.frames.reader import read_frames
     from conespot.localize.image import Reference
     from conespot.localize.locate import locate
     from conespot.localize.model.knowns import Knowns
@@ -25,6 +27,7 @@ if TYPE_CHECKING:
 
 #: where each name lives
 _HOMES = {
+    "Alarm": "localize.distance",
     "Exposure": "render.exposure",
     "InputError": "scene.document",
     "Knowns": "localize.model.prior",
@@ -41,10 +44,12 @@ _HOMES = {
     "locate": "localize.locate",
     "locate_sequence": "localize.sequence",
     "locate_together": "localize.together",
+    "read_frames": "localize.frames.reader",
     "run_campaign": "campaigns.session",
 }
 
 __all__ = [
+    "Alarm",
     "Exposure",
     "InputError",
     "Knowns",
@@ -61,6 +66,7 @@ __all__ = [
     "locate",
     "locate_sequence",
     "locate_together",
+    "read_frames",
     "run_campaign",
 ]
 
