@@ -113,6 +113,9 @@ def _add_own(add: _Add) -> None:
     localize.add_argument("--reference", type=Path, nargs="+", metavar="FRAMES", help="frames without spotlights")
     localize.add_argument("--csv", type=Path, metavar="FILE", help="write a row for each frame")
     localize.add_argument("--json", type=Path, metavar="FILE", help="write the same with covariances")
+    localize.add_argument("--tum", type=Path, metavar="FILE", help="write a TUM trajectory")
+    localize.add_argument("--mcap", type=Path, metavar="FILE", help="write poses and frames as ROS 2 records them")
+    localize.add_argument("--rate", metavar="HZ", help="frames a second, such as '60 Hz', where they have no times")
     localize.add_argument("--overlay", type=Path, metavar="FOLDER", help="draw what was seen in each frame")
     alarm = "say which tips are safe: farther from the wall than this, such as '0.1 mm' (research, no safety device)"
     localize.add_argument("--alarm", metavar="DISTANCE", help=alarm)

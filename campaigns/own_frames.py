@@ -4,13 +4,14 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 from conespot.campaigns.answers import Answer, CsvOutput, JsonOutput, Output, OverlayOutput, Table
 from conespot.campaigns.own_scene import described_scene
+from conespot.campaigns.trajectory_outputs import McapOutput, TumOutput
 from conespot.localize.distance import Alarm
-from conespot.localize.frames.reader import read_frames
+from conespot.localize.frames.reader import GivenFrame, read_frames
 from conespot.localize.image import Reference
 from conespot.localize.locate import LOCALIZERS, find_localizer, locate
 from conespot.localize.model.knowns import Knowns
@@ -39,7 +40,7 @@ class OwnFrames:
     Raises InputError, before any frame is looked at, for a scene or a localizer that cannot be used.
     """
 
-    def __init__(self, name: str, settings: Sequence[str], localizer: str) -> None:
+    def __init__(self, name: str, settings: Sequence[str], localizer: str, rate_hz: float | None = None) -> None:
         self.scene, knowledge = described_scene(name, settings, "localize")
         entry = find_localizer(localizer)
         if entry.needs_truth:
@@ -48,6 +49,7 @@ class OwnFrames:
         self.localizer = localizer
         self._knowns: Knowns | None = knowledge.knowns if entry.takes_knowledge else None
         self._reference: Reference | None = None
+        self._rate_hz = rate_hz
 
     def learn(self, unlit: Sequence[Path]) -> None:
         """Take frames without spotlights, averaged, as the view of the retina. Raises InputError."""
@@ -57,9 +59,28 @@ class OwnFrames:
 
     def answers(self, sources: Sequence[Path], alarm: Alarm | None) -> Iterator[Answer]:
         """An answer for every frame. Raises InputError where it gets to one that does not fit the scene."""
-        for frame in read_frames(sources, self.scene):
+        for frame in timed(read_frames(sources, self.scene), self._rate_hz):
             outcome = locate(frame.image, self.scene, self.localizer, knowns=self._knowns, reference=self._reference)
             yield Answer.of(frame, outcome, alarm)
+
+
+def make_rate(text: str | None) -> float | None:
+    """Frames a second of an option; None without it. Raises InputError."""
+    if text is None:
+        return None
+    try:
+        rate = parse_quantity(text, "frequency", bare=False)
+        if not 1e-6 <= rate <= 1e6:
+            raise ValueError(f"{text} is no rate of frames")
+    except ValueError as error:
+        raise InputError(f"--rate: {error}") from None
+    return rate
+
+
+def timed(frames: Iterator[GivenFrame], rate_hz: float | None) -> Iterator[GivenFrame]:
+    """The frames, with the time stamps [s] of a rate in place of none or of their own; as they are without one."""
+    for number, frame in enumerate(frames):
+        yield frame if rate_hz is None else replace(frame, time_s=number / rate_hz)
 
 
 def make_alarm(distance: str | None, false_safe: float, scene: Scene) -> Alarm | None:
@@ -85,7 +106,14 @@ def noiseless(scene: Scene) -> str:
 
 
 def outputs(
-    own: OwnFrames, alarm: Alarm | None, *, csv: Path | None, json: Path | None, overlay: Path | None
+    own: OwnFrames,
+    alarm: Alarm | None,
+    *,
+    csv: Path | None,
+    json: Path | None,
+    overlay: Path | None,
+    tum: Path | None = None,
+    mcap: Path | None = None,
 ) -> list[Output]:
     """What the options ask for beside the table. Raises InputError for what could not be written."""
     found: list[Output] = []
@@ -93,6 +121,10 @@ def outputs(
         found.append(CsvOutput(csv))
     if json is not None:
         found.append(JsonOutput(json, own.scene, own.localizer, alarm))
+    if tum is not None:
+        found.append(TumOutput(tum))
+    if mcap is not None:
+        found.append(McapOutput(mcap, own.scene))
     if overlay is not None:
         found.append(OverlayOutput(overlay, own.scene, own.localizer))
     return found

@@ -84,13 +84,16 @@ def read_score(path: Path, name: str, folder: Path, plan: Plan) -> Found:
     }
     found: dict[tuple[str, int], Finding] = {}
     behind: list[int] = []
-    for frame, estimate in estimates.items():
+    for written, estimate in estimates.items():
+        frame = written if written in places else Path(written).stem  # the image's file may be named
         if frame not in places:
             raise InputError(
-                f"{path}:{estimate.line}: {frame[:40]!r} is no frame that was exported from {folder}; give the column"
+                f"{path}:{estimate.line}: {written[:40]!r} is no frame that was exported from {folder}; give the column"
                 " frame of its index.csv"
             )
         case, pose = places[frame]
+        if (case.key, pose) in found:
+            raise InputError(f"{path}:{estimate.line}: the frame {frame} stands in another line too")
         finding, forward = _finding(path, case, name, estimate)
         found[case.key, pose] = finding
         behind += [] if forward else [estimate.line]

@@ -180,13 +180,14 @@ def debug(options: argparse.Namespace) -> Ending:
 
 def localize(options: argparse.Namespace) -> Ending:
     """Localize frames of one's own camera."""
-    from conespot.campaigns.own_frames import Count, OwnFrames, localize, make_alarm, outputs
+    from conespot.campaigns.own_frames import Count, OwnFrames, localize, make_alarm, make_rate, outputs
 
-    own, count = OwnFrames(options.scene, options.set, options.localizer), Count()
+    own, count = OwnFrames(options.scene, options.set, options.localizer, make_rate(options.rate)), Count()
     alarm = make_alarm(options.alarm, options.false_safe, own.scene)
     if options.reference:
         own.learn(options.reference)
-    beside = outputs(own, alarm, csv=options.csv, json=options.json, overlay=options.overlay)
+    files = {name: getattr(options, name) for name in ("csv", "json", "overlay", "tum", "mcap")}
+    beside = outputs(own, alarm, **files)
     for line in localize(own, options.frames, alarm, beside, count):
         _say(line)
     return _fail(count.sentence, Ending.FAILED) if count.sentence else Ending.DONE

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from conespot.localize.frames.fit import fitted
+from conespot.localize.frames.recording import SUFFIX, read_recording
 from conespot.localize.frames.still import kind_of, read_still
 from conespot.localize.frames.video import SUFFIXES, read_video
 from conespot.localize.image import AnyImage
@@ -45,6 +46,10 @@ def read_frames(sources: Sequence[Path], scene: Scene) -> Iterator[GivenFrame]:
                 yield _still(inside, scene)
         elif path.suffix.lower() in SUFFIXES and kind_of(path) is None:
             for number, (time, stored) in enumerate(read_video(path, scene)):
+                name = f"{path}, frame {number}"
+                yield GivenFrame(name, time, fitted(name, stored, scene))
+        elif path.suffix.lower() == SUFFIX and kind_of(path) is None:
+            for number, (time, stored) in enumerate(read_recording(path, scene)):
                 name = f"{path}, frame {number}"
                 yield GivenFrame(name, time, fitted(name, stored, scene))
         else:

@@ -63,6 +63,19 @@ def read_still(path: Path, kind: str, scene: Scene) -> Stored:
         raw = read_bytes(path, rows * columns * _MOST_BYTES + _BESIDE_BYTES, f"frame of {columns} x {rows} px")
     except ValueError as error:
         raise InputError(str(error)) from None
+    return _picture(name, kind, raw, scene)
+
+
+def still_of(name: str, raw: bytes, scene: Scene) -> Stored:
+    """The picture in the bytes of a PNG, JPEG or TIFF called `name`. Raises InputError as `read_still` does."""
+    kind = next((kind for magic, kind in MAGIC.items() if raw.startswith(magic)), None)
+    rows, columns = scene.camera.shape
+    if kind not in ("PNG", "JPEG", "TIFF") or len(raw) > rows * columns * _MOST_BYTES + _BESIDE_BYTES:
+        raise InputError(f"{name}: is no PNG, JPEG or TIFF of a frame of {columns} x {rows} px")
+    return _picture(name, kind, raw, scene)
+
+
+def _picture(name: str, kind: str, raw: bytes, scene: Scene) -> Stored:
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")  # Pillow's remarks on headers
         match kind:
