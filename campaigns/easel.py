@@ -49,7 +49,7 @@ class Easel:
             "fitted": saw.fitted,
         }
         residuals = [Residual(p.row, p.column, p.side, p.light - p.predicted) for p in saw.patches]
-        white = 1.0 if image.dtype.kind == "f" else float(white_level(image, scene))
+        white = 1.0 if image.dtype.kind == "f" else float(white_level(image, scene.sensor))
         said = outcome.reason if isinstance(outcome, LocalizationFailure) else "localized"
         draw_overlay(
             Overlay(image, white, lines, saw.mask, residuals),

@@ -31,7 +31,7 @@ def draw_answer(answer: Answer, scene: Scene, localizer: str, path: Path) -> Non
         distance = _distance(found)
     else:
         said = f"refused: {found.reason}"
-    white = 1.0 if image.dtype.kind == "f" else float(white_level(image, scene))
+    white = 1.0 if image.dtype.kind == "f" else float(white_level(image, scene.sensor))
     residuals = [Residual(p.row, p.column, p.side, p.light - p.predicted) for p in saw.patches]
     safe = {None: "", True: " Safe.", False: " NOT SAFE."}[answer.safe]
     draw_overlay(

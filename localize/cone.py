@@ -6,13 +6,14 @@ is their own. Not an ellipse, and no threshold after the start.
 
 from __future__ import annotations
 
+from conespot.localize.doubt import answered, noise_of
 from conespot.localize.edge.fit import fit_edge
 from conespot.localize.image import AnyImage, Frame, Reference
 from conespot.localize.model.estimate import Estimate
 from conespot.localize.model.knowns import Knowns
 from conespot.localize.model.noise import NoiseModel
 from conespot.localize.outcome import LocalizationFailure, Outcome
-from conespot.localize.start.search import believed, find_starts
+from conespot.localize.start.search import Start
 from conespot.localize.verdict import judged
 from conespot.scene.scene import Scene
 
@@ -26,9 +27,13 @@ def cone(
     noise: NoiseModel | None = None,
 ) -> Outcome:
     """The tip from a checked image `[H, W]` or `[H, W, 3]`; `reference` (no spotlight) helps the search only."""
-    known, sensor, frame = (knowns or Knowns()).within(scene), noise or scene.sensor.noise, Frame(image, scene.sensor)
-    starts = find_starts(frame, scene, reference)
-    return believed(starts, scene, lambda start: edge_outcome(frame, Estimate(start.pose, scene), known, sensor))
+    known, frame = (knowns or Knowns()).within(scene), Frame(image, scene.sensor)
+    sensor = noise_of(frame, noise)
+
+    def localized(start: Start) -> Outcome:
+        return edge_outcome(frame, Estimate(start.pose, scene), known, sensor)
+
+    return answered(frame, scene, reference, localized)
 
 
 def edge_outcome(

@@ -45,13 +45,13 @@ def checked(image: ArrayLike, scene: Scene) -> AnyImage:
         if not np.isfinite(array).all():
             raise InputError("image: has pixels that are NaN or infinite; mask or repair them first")
         return np.minimum(array, 1.0) if float(array.max(initial=0.0)) > 1.0 else array
-    if array.dtype == np.uint16:
-        _check_values(array, scene.sensor.full_scale)
+    elif array.dtype == np.uint16 or scene.sensor.full_scale < 255:
+        _check_values(array, white_level(array, scene.sensor))
     return array
 
 
 def _check_values(array: AnyImage, full: int) -> None:
-    """Raises InputError for whole numbers of 16 bits that are not those of a sensor whose white is `full`."""
+    """Raises InputError for whole numbers that are not those of a sensor whose white is `full`."""
     most = int(array.max(initial=0))
     if most > full:
         raise InputError(
@@ -79,6 +79,11 @@ class Frame:
     sensor: ImageSensor
 
     @property
+    def steps(self) -> int | None:
+        """Steps from 0 to white in which its values are rounded; None for float pixels."""
+        return None if self.pixels.dtype.kind == "f" else white_level(self.pixels, self.sensor)
+
+    @property
     def side(self) -> int:
         """Pixels along the longer side."""
         return max(self.pixels.shape[:2])
@@ -102,7 +107,7 @@ class Reference:
         if isinstance(reference, Reference):
             return cls(np.asarray(checked(reference.pixels, scene), np.float32), reference.frames)
         image = checked(reference, scene)
-        white = 1.0 if image.dtype.kind == "f" else white_level(image, scene)
+        white = 1.0 if image.dtype.kind == "f" else white_level(image, scene.sensor)
         return cls(image.astype(np.float32) / np.float32(white))
 
     @classmethod
@@ -118,18 +123,19 @@ class Reference:
         return cls(total / np.float32(count), float(count))
 
 
-def white_level(image: AnyImage, scene: Scene) -> int:
+def white_level(image: AnyImage, sensor: ImageSensor) -> int:
     """The largest value a pixel of an image of whole numbers can take."""
-    return scene.sensor.full_scale if image.dtype == np.uint16 else 255
+    return sensor.full_scale if image.dtype == np.uint16 else min(255, sensor.full_scale)
 
 
 def linear_light(pixels: AnyImage, sensor: ImageSensor) -> tuple[Signal, NDArray[np.bool_]]:
     """Signals [white] of pixel values of any shape, and which of them are clipped and only bounds.
 
-    uint8: 255 is white; uint16: the sensor's full scale; float: 1.0. Raises InputError for any other type.
+    uint8: 255 is white, or what fewer bits end at; uint16: the sensor's full scale; float: 1.0. Raises InputError for
+    any other type.
     """
     if pixels.dtype == np.uint8 or pixels.dtype == np.uint16:
-        full = 255 if pixels.dtype == np.uint8 else sensor.full_scale
+        full = white_level(pixels, sensor)
         signal, clipped = _tables(sensor, full, 256 if pixels.dtype == np.uint8 else 65536)
         return signal[pixels], clipped[pixels]
     if np.issubdtype(pixels.dtype, np.floating):
@@ -158,7 +164,7 @@ def grey8(image: AnyImage, scene: Scene) -> NDArray[np.uint8]:
         array = cv2.cvtColor(array, cv2.COLOR_RGB2GRAY)
     if array.dtype.kind == "f":
         return _scaled(np.maximum(array, 0.0), 255.0)
-    white = scene.sensor.full_scale if array.dtype == np.uint16 else min(255, scene.sensor.full_scale)
+    white = white_level(array, scene.sensor)
     if array.dtype == np.uint8 and white == 255:
         return np.asarray(array, np.uint8)
     return _scaled(array, 255.0 / white)

@@ -12,7 +12,7 @@ from conespot.localize.image import AnyImage, Reference, checked
 from conespot.localize.localizer import Beside, Localizer
 from conespot.localize.model.knowns import Knowns
 from conespot.localize.model.noise import NoiseModel
-from conespot.localize.outcome import Outcome
+from conespot.localize.outcome import OUTSIDE, Localization, LocalizationFailure, Outcome
 from conespot.localize.plugin import load_plugin, plugins
 from conespot.localize.published.methods import paper, paper_code, paper_code_float, paper_code_oracle
 from conespot.scene import InputError, Pose, Scene
@@ -129,4 +129,6 @@ def locate(
                 )
     unlit = None if reference is None else Reference.of(reference, scene)
     outcome = entry.run(checked(image, scene), scene, Beside(oracle, knowns, unlit, noise))
+    if isinstance(outcome, Localization) and not scene.depth(outcome.apex_mm) > 0.0:
+        return LocalizationFailure(OUTSIDE)
     return with_distance(outcome, scene, knowns or Knowns())

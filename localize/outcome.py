@@ -14,8 +14,11 @@ Array = NDArray[np.float64]
 COVERED: Final = "too little of the patch is in the frame"
 UNCERTAIN: Final = "too uncertain: the patch and what is known do not hold the tip within the limit"
 OUTSIDE: Final = "the tip would be outside the eye"
+#: reasons of the frame itself
+COMPRESSED: Final = "the frame went through JPEG, of which the scene's sensor says nothing: state a recorded one"
 #: reasons of the published methods
 NOTHING_FOUND: Final = "nothing found: no patch stands out of the background"
+NO_LIGHT: Final = "no light of a spotlight: nothing is twice as bright as its surroundings"
 FEWER_PATCHES: Final = "fewer patches than spotlights"
 CUT_BY_BORDER: Final = "patch cut by the image border"
 NO_INTERSECTION: Final = "no real intersection: the outline leaves the eye"

@@ -8,6 +8,7 @@ spotlights, or a sequence over the same retina, takes its place as far as it is 
 from __future__ import annotations
 
 from conespot.localize.cone import edge_outcome
+from conespot.localize.doubt import answered, noise_of
 from conespot.localize.edge.fit import is_clipped, is_sharp
 from conespot.localize.field.fit import fit_patch
 from conespot.localize.image import AnyImage, Frame, Reference
@@ -16,7 +17,7 @@ from conespot.localize.model.knowns import Knowns
 from conespot.localize.model.noise import NoiseModel
 from conespot.localize.model.solve import inverse
 from conespot.localize.outcome import LocalizationFailure, Outcome
-from conespot.localize.start.search import Start, believed, find_starts
+from conespot.localize.start.search import Start
 from conespot.localize.verdict import judged
 from conespot.scene.scene import Scene
 
@@ -30,7 +31,8 @@ def photometric(
     noise: NoiseModel | None = None,
 ) -> Outcome:
     """The tip from a checked image `[H, W]` or `[H, W, 3]`; `reference` is the same view in ambient light alone."""
-    known, sensor, frame = (knowns or Knowns()).within(scene), noise or scene.sensor.noise, Frame(image, scene.sensor)
+    known, frame = (knowns or Knowns()).within(scene), Frame(image, scene.sensor)
+    sensor = noise_of(frame, noise)
 
     def localized(start: Start) -> Outcome:
         estimate = Estimate(start.pose, scene)
@@ -44,4 +46,4 @@ def photometric(
             misfit=fit.misfit, covered=fit.lit_share, settled=fit.settled,
         )  # fmt: skip
 
-    return believed(find_starts(frame, scene, reference), scene, localized)
+    return answered(frame, scene, reference, localized)

@@ -69,7 +69,7 @@ class AmbientMap:
             if image.dtype.kind == "f":
                 self._black /= self._scene.sensor.full_scale
             else:
-                self._white = float(white_level(image, self._scene))
+                self._white = float(white_level(image, self._scene.sensor))
         elif self._sum.shape != image.shape:
             raise InputError(f"sequence: a frame of shape {image.shape} after frames of {self._sum.shape}")
         margin = SEQUENCE.margin * float(np.max(np.ptp(points, axis=0))) + SEQUENCE.margin_px

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from conespot.localize.outcome import CUT_BY_BORDER, FEWER_PATCHES, NOTHING_FOUND, LocalizationFailure
 from conespot.localize.published.settings import PUBLISHED
 from conespot.localize.published.smoothing import Counts, smoothed
+from conespot.scene import Scene
 
 Grey = NDArray[np.uint8]
 Contour = NDArray[np.int32]
@@ -104,6 +105,20 @@ def outlines(mask: Mask, count: int) -> list[Contour] | LocalizationFailure:
     if len(largest) < count:
         return LocalizationFailure(FEWER_PATCHES)
     return [np.asarray(c, np.int32) for c in largest]
+
+
+def contrast(grey: Grey, mask: Mask, scene: Scene) -> float:
+    """Mean light where the mask is bright over that elsewhere, from a part of the pixels of grey values `[H, W]`."""
+    height, width = mask.bright.shape
+    inside = cv2.mean(grey[mask.top : mask.top + height, mask.left : mask.left + width], mask=mask.bright)[0]
+    step = max(1, max(grey.shape) // PUBLISHED.contrast_px)
+    rest = np.ones(grey.shape, bool)
+    rest[mask.top : mask.top + height, mask.left : mask.left + width] = mask.bright == 0
+    around = grey[::step, ::step][rest[::step, ::step]]
+    level = float(around.mean()) if around.size else inside
+    levels = np.array([inside, level]) / 255.0
+    lit, ground = scene.sensor.decode(levels)
+    return float(lit / max(ground, 1.0 / 255.0 / 12.92))
 
 
 def _span(bright: NDArray[np.bool_]) -> slice:

@@ -16,6 +16,7 @@ from conespot.localize.outcome import (
     NEAR_CIRCLE,
     NO_ELLIPSE,
     NO_INTERSECTION,
+    NO_LIGHT,
     OUTSIDE,
     Localization,
     LocalizationFailure,
@@ -23,7 +24,7 @@ from conespot.localize.outcome import (
 )
 from conespot.localize.published.authors_code import coded_candidates
 from conespot.localize.published.cone_geometry import Array, Candidates, cone_over_ellipse, fitted_plane, retina_points
-from conespot.localize.published.detection import Contour, Grey, Mask, coded_mask, otsu_mask, outlines
+from conespot.localize.published.detection import Contour, Grey, Mask, coded_mask, contrast, otsu_mask, outlines
 from conespot.localize.published.ellipse import fit_ellipse
 from conespot.localize.published.ideal_pinhole import as_the_paper_sees
 from conespot.localize.published.settings import PUBLISHED
@@ -53,9 +54,13 @@ class Method:
 
     def localize(self, image: AnyImage, scene: Scene, truth: Pose | None = None) -> Outcome:
         """The answer; with a `truth` the candidates nearest to it are taken."""
-        found = outlines(self.segment(grey8(image, scene)), len(scene.spotlights))
+        grey = grey8(image, scene)
+        mask = self.segment(grey)
+        found = outlines(mask, len(scene.spotlights))
         if isinstance(found, LocalizationFailure):
             return found
+        if contrast(grey, mask, scene) < PUBLISHED.least_contrast:
+            return LocalizationFailure(NO_LIGHT)
         told = scene
         patches, scene = as_the_paper_sees(found, scene)
         pairs: list[Candidates] = []

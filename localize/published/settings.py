@@ -21,6 +21,11 @@ class PublishedSettings:
     #: a blob of less area than this share of the largest is texture, not a spotlight: all cones are equal and share
     #: one apex
     smallest_share: float = 0.1
+    #: light of what is cut out over that of the rest below which it is the ground's own and no spotlight's: a choice of
+    #: ours, like the refusal itself. No answer of `campaign run reproduce_ci` changes
+    least_contrast: float = 2.0
+    #: pixels a side, about, from which the ground is judged
+    contrast_px: int = 250
     #: a - b of the ellipse [px] below which one spotlight does not tell where its cone leans; an outline of whole
     #: pixels places a - b to about that, and at 9 deg it is worth 0.15 mm sideways
     round_px: float = 0.1

@@ -92,11 +92,33 @@ def find_starts(frame: Frame, scene: Scene, reference: Reference | None = None) 
         found = _settled(overview, scene, [*rings, *more], found, thorough=True)
     if found:
         found = _merged([*found, *_turned(overview, scene, found[0])])
+    given = []
     for start in found[: START.most_starts]:
         unsure = START.touching if start.touches(found[0], scene) else START.apart
         share = START.as_good if found[0].explained > START.convincing else unsure
         if start.evidence >= share * found[0].evidence and start.stands_out:
+            given.append(start)
             yield start
+    if given and not several:
+        yield from _instruments(overview, scene, rings, given)
+
+
+def _instruments(overview: Overview, scene: Scene, rings: Sequence[Ring], given: Sequence[Start]) -> Iterator[Start]:
+    """Starts on rings elsewhere that would be convincing by themselves: another instrument's spotlight."""
+    taken = [circle for start in given for circle in _circles(start.pose, scene)]
+    for ring in rings:
+        if any(float(np.linalg.norm(ring.centre - middle)) < max(ring.radius, radius) for middle, radius in taken):
+            continue
+        for pose in poses_on([ring], scene):
+            seen = rays_across(overview, scene, pose)
+            if not seen or support(seen)[1] < START.elsewhere:
+                continue
+            start = _settle(overview, scene, pose, thorough=False)
+            if start is None or not start.stands_out or start.explained <= START.convincing:
+                continue
+            if all(_differ(start.pose, other.pose) for other in given):
+                yield start
+                return
 
 
 def believed(starts: Iterable[Start], scene: Scene, localized: Callable[[Start], Outcome]) -> Outcome:

@@ -132,6 +132,9 @@ class StartSettings:
     apart_rad: float = 0.2
     #: share of the gradients that a patch explains where nothing else is bright; a disc may explain nearly as much
     convincing: float = 0.6
+    #: share that a quarter of the rays across a ring elsewhere exceed where that may be another spotlight's patch: of
+    #: six pairs of patches the least has 0.5, of the other rings there none more than 0
+    elsewhere: float = 0.3
     #: what crosses a rim hides it on some rays only: a quarter of them must see more of the beam's edge than of all
     #: else, so more than half
     clear: float = 0.52

@@ -1,0 +1,78 @@
+"""Frames that are not what the scene says are refused with the reason, or read for what they are."""
+
+import cv2
+import numpy as np
+import pytest
+from photographs import NOISE, photograph, scene_of
+
+from conespot.localize import locate
+from conespot.localize.compression import compressed
+from conespot.localize.outcome import COMPRESSED, NO_LIGHT
+from conespot.localize.start.search import TWO_PLACES
+from conespot.scene import InputError
+from conespot.scene.beam import CyclesBeam, HardBeam
+from conespot.scene.sensor import Linear
+
+SIDE = 400
+HERE, THERE = (-1.5, -1.5, 3.0), (1.8, 1.6, 3.0)
+ALL = slice(0, SIDE)
+
+
+@pytest.fixture(scope="module")
+def soft():
+    scene = scene_of(CyclesBeam(), resolution=SIDE)
+    return scene, photograph(scene, scene.pose(np.array(HERE)), rays=2)
+
+
+@pytest.fixture(scope="module")
+def clipped(frames):
+    scene = frames.make_scene(resolution=SIDE, beam=CyclesBeam())
+    return scene, frames.frame(scene, scene.pose(np.array(HERE)))
+
+
+def off_um(found, tip=HERE):
+    return 1e3 * float(np.linalg.norm(found.apex_mm - tip))
+
+
+@pytest.mark.parametrize("quality", [95, 90, 75])
+def test_a_frame_that_went_through_jpeg_is_refused_and_the_same_without_is_not(clipped, quality):
+    scene, image = clipped
+    pressed = cv2.imdecode(cv2.imencode(".jpg", image, [cv2.IMWRITE_JPEG_QUALITY, quality])[1], cv2.IMREAD_GRAYSCALE)
+    assert locate(image, scene, "photometric")
+    assert locate(pressed, scene, "photometric").reason == COMPRESSED
+
+
+@pytest.mark.parametrize("noise", [0.0, 1.0, 4.0])
+def test_no_noise_looks_like_a_jpeg(clipped, noise):
+    image = clipped[1] + noise * np.random.default_rng(1).standard_normal(clipped[1].shape)
+    eight = np.clip(np.round(image), 0, 255).astype(np.uint8)
+    assert not compressed(eight, ALL, ALL)
+    assert not compressed(eight.astype(np.uint16), ALL, ALL)
+    assert not compressed(eight, slice(3, 9), ALL)
+
+
+@pytest.mark.parametrize("beam", [CyclesBeam(), HardBeam()])
+def test_two_instruments_are_refused_where_the_scene_has_one(beam):
+    scene = scene_of(beam, resolution=SIDE)
+    one, other = (photograph(scene, scene.pose(np.array(tip)), rays=2) for tip in (HERE, THERE))
+    assert locate(one, scene, "photometric", noise=NOISE)
+    assert locate(np.maximum(one, other), scene, "photometric", noise=NOISE).reason == TWO_PLACES
+
+
+def test_a_sensor_of_few_bits_is_white_where_they_end_and_rounds_by_their_steps(soft):
+    scene, image = soft
+    four = scene.model_copy(update={"sensor": Linear(bits=5)})
+    with pytest.raises(InputError, match="whose white is 31"):
+        locate((image >> 4).astype(np.uint8), four)
+    found = locate(np.round(image / 4095 * 31).astype(np.uint8), four, "photometric")
+    fine = locate(image, scene, "photometric")
+    assert off_um(found) < 6e3 * np.sqrt(np.trace(found.covariance[:3, :3]))
+    assert np.trace(found.covariance[:3, :3]) > np.trace(fine.covariance[:3, :3])
+
+
+@pytest.mark.parametrize("name", ["paper", "paper-code", "paper-code-float"])
+def test_no_published_method_answers_on_a_frame_without_light(frames, name):
+    scene = frames.make_scene(resolution=SIDE)
+    dark = np.full((SIDE, SIDE), 47, np.uint8)
+    cv2.ellipse(dark, (180, 140), (30, 26), 0.0, 0.0, 360.0, 55, -1)
+    assert locate(dark, scene, name).reason == NO_LIGHT
