@@ -9,12 +9,11 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from conespot.campaigns.plan import Case, Group, Plan
+from conespot.campaigns.plan import Group, Plan
+from conespot.campaigns.variation import variation, wrapped
 from conespot.render.rim import rim_pixels
 from conespot.scene import Pose
 from conespot.scene.exposure_limits import RetinalExposure, scene_exposure
-
-_MOST_CASES = 60
 
 
 @dataclass(frozen=True)
@@ -30,6 +29,20 @@ class Pace:
 PACE = Pace()
 
 
+@dataclass(frozen=True)
+class Size:
+    """What a run takes [bytes], as its processes and folder were measured, at 500 to 5000 px (docs/performance.md)."""
+
+    session: float = 0.4e9  #: the command itself, with the figures
+    worker: float = 0.7e9  #: a process that renders a grey retina
+    spectral_worker: float = 1.2e9  #: one that renders a living fundus
+    row: float = 1.2e3  #: in journal, CSV and parquet together
+    report: float = 5e6
+
+
+SIZE = Size()
+
+
 def describe(plan: Plan, workers: int) -> Iterator[str]:
     """Lines that say what a run of the plan does with that many workers."""
     campaign = plan.campaign
@@ -39,22 +52,26 @@ def describe(plan: Plan, workers: int) -> Iterator[str]:
     if not plan.cases:
         return
     yield f"{len(plan.cases)} cases, {plan.frames} frames, {plan.rows} localizations (one row each)"
-    for case in plan.cases[:_MOST_CASES]:
-        labels = {k: v for k, v in case.labels.items() if k not in ("power_w", "resolution_px")} | case.swept
-        words = " ".join(f"{v}" if k in case.labels else f"{k}={v}" for k, v in labels.items())
-        px = case.scene.camera.size_words
-        yield f"  {case.key}  {words} {px}, {_both(case)}, {', '.join(case.localizers)}"
-    if len(plan.cases) > _MOST_CASES:
-        yield f"  ... and {len(plan.cases) - _MOST_CASES} more"
+    yield from variation(plan)
     yield (
         f"{plan.tiles} tiles and {plan.scenes} backgrounds are rendered; powers, knowledge and localizers share them "
         f"({len(plan.groups)} groups of cases)"
     )
     yield f"about {_duration(_seconds(plan) / workers)} on {workers} workers (on cores like those it was tuned on)"
     yield from _exposures(plan)
-    if campaign.frames:
-        size = sum(len(g.positions) * g.frames * 4.0 * math.prod(g.scene.camera.shape) for g in plan.groups)
-        yield f"frames take up to {size / 1e9:.1f} GB on the disk"
+    yield f"about {_memory(plan, workers) / 1e9:.1f} GB of memory, and {_disk(plan) / 1e6:.0f} MB of disk"
+
+
+def _memory(plan: Plan, workers: int) -> float:
+    """Memory [bytes] of the processes of a run."""
+    spectral = any(case.scene.retina.is_spectral for case in plan.cases)
+    return SIZE.session + workers * (SIZE.spectral_worker if spectral else SIZE.worker)
+
+
+def _disk(plan: Plan) -> float:
+    """Disk [bytes] that the run folder takes."""
+    frames = sum(len(g.positions) * g.frames * 4.0 * math.prod(g.scene.camera.shape) for g in plan.groups)
+    return SIZE.report + SIZE.row * plan.rows + (frames if plan.campaign.frames else 0.0)
 
 
 def _exposures(plan: Plan) -> Iterator[str]:
@@ -68,13 +85,7 @@ def _exposures(plan: Plan) -> Iterator[str]:
         if light not in worst or found.irradiance > worst[light].irradiance:
             worst[light] = found
     for light, found in worst.items():
-        yield f"{light}, brightest: {found.sentence}"
-
-
-def _both(case: Case) -> str:
-    """The power of one spotlight in both conventions."""
-    both = case.scene.power.both(case.scene.beam)
-    return f"{both.isotropic_w:.4g} W isotropic = {1e3 * both.flux_w:.4g} mW flux"
+        yield from wrapped("exposure", f"{light}, brightest: {found.sentence}")
 
 
 def _seconds(plan: Plan) -> float:

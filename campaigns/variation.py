@@ -22,22 +22,34 @@ def variation(plan: Plan) -> Iterator[str]:
                 values.append(value)
     several = {name: values for name, values in table.items() if len(values) > 1}
     for name, values in several.items():
-        shown = values if len(values) <= _MOST_VALUES else [*values[: _MOST_VALUES - 2], "...", values[-1]]
-        more = "" if len(values) == len(shown) else f" ({len(values)} in all)"
-        yield from _line(name, ", ".join(textwrap.shorten(value, 70, placeholder=" ...") for value in shown) + more)
+        yield from wrapped(name, ", ".join(textwrap.shorten(value, 70, placeholder=" ...") for value in _shown(values)))
     same = [(f"{name} " if "." in name else "") + values[0] for name, values in table.items() if len(values) == 1]
-    yield from _line("in all" if several else "one case", ", ".join(same))
+    yield from wrapped("in all" if several else "one case", ", ".join(same))
+    for number, power in enumerate(_shown(list(dict.fromkeys(_power(case) for case in plan.cases)))):
+        yield from wrapped("" if number else "power", power)
+
+
+def wrapped(name: str, text: str) -> Iterator[str]:
+    """Lines of a name and what is said of it beside it."""
+    first, rest = f"  {name:{_MARGIN - 3}} ", " " * _MARGIN
+    yield from textwrap.wrap(text, _WIDTH, initial_indent=first, subsequent_indent=rest, break_long_words=False)
+
+
+def _shown(values: list[str]) -> list[str]:
+    """The values, or of many the first and the last, and how many there are."""
+    if len(values) <= _MOST_VALUES:
+        return values
+    return [*values[: _MOST_VALUES - 2], f"... ({len(values)} in all)", values[-1]]
 
 
 def _said(case: Case) -> dict[str, str]:
     labels = {name: f"{value}" for name, value in case.labels.items() if name not in ("power_w", "resolution_px")}
-    both = case.scene.power.both(case.scene.beam)
-    labels["power"] = f"{both.isotropic_w:.4g} W isotropic = {1e3 * both.flux_w:.4g} mW flux"
     labels["size"] = case.scene.camera.size_words
     labels |= {name: f"{value}" for name, value in case.swept.items()}
     return labels | {"localizers": " and ".join(case.localizers)}
 
 
-def _line(name: str, text: str) -> Iterator[str]:
-    first, rest = f"  {name:{_MARGIN - 3}} ", " " * _MARGIN
-    yield from textwrap.wrap(text, _WIDTH, initial_indent=first, subsequent_indent=rest, break_long_words=False)
+def _power(case: Case) -> str:
+    """The power of one spotlight in both conventions."""
+    both = case.scene.power.both(case.scene.beam)
+    return f"{both.isotropic_w:.4g} W isotropic = {1e3 * both.flux_w:.4g} mW flux"

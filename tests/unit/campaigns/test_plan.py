@@ -1,5 +1,7 @@
 """campaigns.plan: cases by content, groups that share renderings, seeds that depend on nothing else."""
 
+import re
+
 import numpy as np
 import pytest
 
@@ -152,6 +154,33 @@ def test_the_description_states_both_power_conventions_and_the_renderings():
     assert "1 W isotropic = 3.078 mW flux" in text
     assert "80 tiles and 2 backgrounds are rendered" in text
     assert "280 frames, 560 localizations" in text
+
+
+def test_the_description_is_a_table_of_what_varies_and_not_a_line_a_case():
+    plan = make_plan(override(read_campaign("power_sweep"), "poses", "10", "--poses"))
+    lines = [re.split(r"\s{2,}", line.strip()) for line in describe(plan, workers=2)]
+    table = dict(line for line in lines if len(line) == 2)
+    assert table["trajectory"] == "box, helix"
+    assert table["spotlights"] == "single, triple"
+    assert table["in all"] == "white, smooth, srgb8, 5000 px, paper-code and paper"
+    assert table["power"] == "0.05 W isotropic = 0.1539 mW flux"
+    assert len(lines) < len(plan.cases)
+    assert not [line for line in lines if plan.cases[0].key in line]
+
+
+def test_of_many_values_the_first_and_the_last_are_shown_and_how_many(plan):
+    powers = ", ".join(f"{p} W" for p in range(1, 41))
+    text = "\n".join(describe(plan(f"scene: paper\nposes: 1\nsweep: {{scene.power.value: [{powers}]}}\n"), 1))
+    assert "(40 in all)" in text
+    assert "40 W isotropic" in text
+    assert " 20 W" not in text
+
+
+def test_memory_grows_with_workers_and_disk_with_frames_that_are_kept(plan):
+    text = "scene: {{preset: paper, camera: {{resolution: 1000}}}}\nposes: 10\nframes: {}\n"
+    few, kept = (list(describe(plan(text.format(frames)), n))[-1] for frames, n in (("false", 1), ("true", 3)))
+    assert few == "about 1.1 GB of memory, and 5 MB of disk"
+    assert kept == "about 2.5 GB of memory, and 45 MB of disk"
 
 
 def test_edge_samples_are_rendered_apart_and_are_counted_as_work_where_the_beam_is_hard(plan):
