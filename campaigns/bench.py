@@ -80,12 +80,20 @@ class Bench:
 
     def look(self, unit: Unit, case: Case) -> tuple[AnyImage, dict[str, Outcome]]:
         """One case's frame of a unit, and what each of its localizers answers: what `measure` makes its findings of."""
+        image, exposure, tiles = self._shown(unit, case)
+        unlit = self._unlit(unit, case, exposure, tiles)
+        return image, {name: self._located(unit, case, image, name, unlit) for name in case.localizers}
+
+    def frame(self, unit: Unit, case: Case) -> AnyImage:
+        """One case's frame of a unit."""
+        return self._shown(unit, case)[0]
+
+    def _shown(self, unit: Unit, case: Case) -> tuple[AnyImage, Exposure, list[Tile]]:
+        """A case's frame, what exposed it, and the tiles in it."""
         group = self._plan.groups[unit.group]
         exposure, _ = self._exposure(group, group.pose(unit.pose))
         tiles = self._tiles(self._scene(group)[0], unit)
-        image = exposure.frame(tiles, case.scene.power.value, frame_seed(unit, case))
-        unlit = self._unlit(unit, case, exposure, tiles)
-        return image, {name: self._located(unit, case, image, name, unlit) for name in case.localizers}
+        return exposure.frame(tiles, case.scene.power.value, frame_seed(unit, case)), exposure, tiles
 
     def _exposure(self, group: Group, pose: Pose) -> tuple[Exposure, NDArray[np.float32]]:
         """What exposes a pose's frames, and the background: a shaft lies over it."""

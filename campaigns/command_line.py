@@ -51,14 +51,18 @@ def _add_campaigns(add: _Add) -> None:
     add_questions(init, new_microscope.QUESTIONS, "those of a microscope")
     run = add(subcommands.run, "render, localize and compare; an interrupted run is continued")
     plan = add(subcommands.plan, "say what a run would do")
+    preview = add(
+        subcommands.preview, "draw one frame of a campaign in seconds, and its set-up from the side, to scale"
+    )
+    preview.add_argument("--out", metavar="FILE", type=Path, help="the picture (default: NAME_preview.png)")
     validate = add(subcommands.validate, "check a campaign and every combination it sweeps over")
     theory = add(subcommands.theory, "say how well a scene could be localized: bounds, error budget, design guidance")
     theory.add_argument("scene", nargs="?", default="paper-code", help="a preset or a YAML file (default: paper-code)")
-    for command in (run, plan, validate, theory):
+    for command in (run, plan, preview, validate, theory):
         if command is not theory:
             command.add_argument("campaign", help="a YAML file, or the name of a shipped campaign")
         add_set(command)
-    for command in (run, plan, validate):
+    for command in (run, plan, preview, validate):
         add_settings(command)
     run.add_argument("--dry-run", action="store_true", help="only say what the run would do")
     run.add_argument("--out", metavar="FOLDER", help="the run folder (default: runs/NAME)")

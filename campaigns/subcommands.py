@@ -59,6 +59,15 @@ def plan(options: argparse.Namespace) -> Ending:
     return Ending.DONE
 
 
+def preview(options: argparse.Namespace) -> Ending:
+    """Draw one frame of a campaign, and its set-up."""
+    from conespot.campaigns.preview import preview
+    from conespot.campaigns.settings import document_of
+
+    _say(preview(document_of(options), options.out))
+    return Ending.DONE
+
+
 def run(options: argparse.Namespace) -> Ending:
     """Run a campaign, or go on with it."""
     if options.dry_run:
