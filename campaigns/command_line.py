@@ -8,6 +8,7 @@ from pathlib import Path
 
 from conespot.campaigns import new_microscope, other_methods, subcommands
 from conespot.campaigns.ending import Ending
+from conespot.campaigns.examples import epilog
 from conespot.campaigns.machines import add_machines, add_workers
 from conespot.campaigns.new_campaign import QUESTIONS
 from conespot.campaigns.questions import add_questions
@@ -15,6 +16,15 @@ from conespot.campaigns.settings import add_set, add_settings
 
 #: adds the command that a function does, called as it is, with what it says of itself
 _Add = Callable[[Callable[[argparse.Namespace], Ending], str], argparse.ArgumentParser]
+
+
+class _AsWritten(argparse.RawDescriptionHelpFormatter):
+    """Keeps the lines of examples."""
+
+    def _fill_text(self, text: str, width: int, indent: str) -> str:
+        if text.startswith("example"):
+            return super()._fill_text(text, width, indent)
+        return argparse.HelpFormatter._fill_text(self, text, width, indent)
 
 
 def parser() -> argparse.ArgumentParser:
@@ -27,7 +37,10 @@ def parser() -> argparse.ArgumentParser:
     commands = line.add_subparsers(required=True, metavar="COMMAND")
 
     def add(run: Callable[[argparse.Namespace], Ending], text: str) -> argparse.ArgumentParser:
-        command = commands.add_parser(run.__name__, help=text, description=f"{text[0].upper()}{text[1:]}.")
+        says = f"{text[0].upper()}{text[1:]}."
+        command = commands.add_parser(
+            run.__name__, help=text, description=says, epilog=epilog(run.__name__), formatter_class=_AsWritten
+        )
         command.set_defaults(run=run)
         return command
 
@@ -77,6 +90,8 @@ def _add_campaigns(add: _Add) -> None:
     explain.add_argument("key", metavar="KEY", help="its dotted path, such as scene.beam.half_angle, or the end of it")
     schema = add(subcommands.schema, "print the JSON Schema of campaigns, with which editors complete and check them")
     schema.add_argument("--scene", action="store_true", help="that of a scene's file, such as a preset, in its place")
+    completed = add(subcommands.completion, "print what lets a shell complete this command's commands and options")
+    completed.add_argument("shell", choices=("bash", "zsh"), metavar="SHELL", help="bash or zsh")
     add(subcommands.show, "print a campaign's file").add_argument("campaign")
 
 

@@ -255,6 +255,15 @@ def schema(options: argparse.Namespace) -> Ending:
     return Ending.DONE
 
 
+def completion(options: argparse.Namespace) -> Ending:
+    """Print a shell's completion."""
+    from conespot.campaigns.command_line import parser
+    from conespot.campaigns.completion import completion
+
+    streams.write(completion(parser(), options.shell))
+    return Ending.DONE
+
+
 def doctor(options: argparse.Namespace) -> Ending:
     """Say what this machine renders with."""
     from conespot.render import kept

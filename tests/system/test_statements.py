@@ -1,4 +1,4 @@
-"""What a report says its numbers assume, for README's example and every shipped campaign, case by case.
+"""What a report says its numbers assume, for the example of docs/campaigns.md and every shipped campaign, case by case.
 
 The campaigns are planned, described and written as run folders with one pose a case and answers that are made up;
 nothing is rendered. Against convention, edge and surface of the scenes that the plan would render.
@@ -27,13 +27,13 @@ from conespot.results.run import load_run
 from conespot.results.tables import make_tables
 from conespot.scene.document import dump, shipped
 
-README = Path(__file__).parents[2] / "README.md"
+PAGE = Path(__file__).parents[2] / "docs" / "campaigns.md"
 CAMPAIGNS = [name for name in sorted(shipped("campaigns", "")) if makes_frames(read_campaign(name))]
 EDGES = {"hard": "hard", "cycles": "Cycles blend", "linear": "linear", "table": "tabulated"}
 
 
 def example():
-    (text,) = re.findall(r"```yaml\n(name: half_angles\n.*?)```", README.read_text(), re.S)
+    (text,) = re.findall(r"```yaml\n(name: half_angles\n.*?)```", PAGE.read_text(), re.S)
     return text
 
 
@@ -49,12 +49,12 @@ def answered(group, pose):
     return Record(unit=group.unit(pose), findings=tuple(findings))
 
 
-@pytest.fixture(scope="module", params=["README", *CAMPAIGNS])
+@pytest.fixture(scope="module", params=["the page", *CAMPAIGNS])
 def written(request, tmp_path_factory):
     """The plan of a campaign, its run, and the boxes of that."""
     folder = tmp_path_factory.mktemp("run")
     name = request.param
-    if name == "README":
+    if name == "the page":
         (folder / "half_angles.yaml").write_text(example())
         name = str(folder / "half_angles.yaml")
     document = override(read_campaign(name), "poses", "1", "--poses")
