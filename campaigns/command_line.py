@@ -1,4 +1,5 @@
-"""The command line of `campaign`: its commands and their options. What they do is in `campaigns.subcommands`."""
+"""The command line of `campaign`: its commands and their options. What they do is in
+`campaigns.subcommands` and `campaigns.authoring`."""
 
 from __future__ import annotations
 
@@ -55,7 +56,7 @@ def parser() -> argparse.ArgumentParser:
 
 def _add_campaigns(add: _Add) -> None:
     """What begins with a campaign or a scene."""
-    init = add(subcommands.init, "write a commented campaign or microscope of your own, from a few answers or options")
+    init = add(authoring.init, "write a commented campaign or microscope of your own, from a few answers or options")
     named = "(default: my_campaign.yaml, or my_microscope.yaml)"
     init.add_argument("file", nargs="?", type=Path, help=named)
     init.add_argument("--microscope", action="store_true", help="write the scene of your own microscope instead")
@@ -64,9 +65,7 @@ def _add_campaigns(add: _Add) -> None:
     add_questions(init, new_microscope.QUESTIONS, "those of a microscope")
     run = add(subcommands.run, "render, localize and compare; an interrupted run is continued")
     plan = add(subcommands.plan, "say what a run would do")
-    preview = add(
-        subcommands.preview, "draw one frame of a campaign in seconds, and its set-up from the side, to scale"
-    )
+    preview = add(authoring.preview, "draw one frame of a campaign in seconds, and its set-up from the side, to scale")
     preview.add_argument("--out", metavar="FILE", type=Path, help="the picture (default: NAME_preview.png)")
     validate = add(subcommands.validate, "check a campaign and every combination it sweeps over")
     theory = add(subcommands.theory, "say how well a scene could be localized: bounds, error budget, design guidance")
@@ -84,15 +83,15 @@ def _add_campaigns(add: _Add) -> None:
     for command in (run, plan):
         add_machines(command)
     run.add_argument("--log", metavar="FILE", type=Path, help="append what happens to a file, a JSON object a line")
-    listed = add(subcommands.list, "list the shipped campaigns")
+    listed = add(authoring.list, "list the shipped campaigns")
     listed.add_argument("--localizers", action="store_true", help="list the localizers in their place")
-    explain = add(subcommands.explain, "say what a key of campaigns and scenes means")
+    explain = add(authoring.explain, "say what a key of campaigns and scenes means")
     explain.add_argument("key", metavar="KEY", help="its dotted path, such as scene.beam.half_angle, or the end of it")
-    schema = add(subcommands.schema, "print the JSON Schema of campaigns, with which editors complete and check them")
+    schema = add(authoring.schema, "print the JSON Schema of campaigns, with which editors complete and check them")
     schema.add_argument("--scene", action="store_true", help="that of a scene's file, such as a preset, in its place")
-    completed = add(subcommands.completion, "print what lets a shell complete this command's commands and options")
+    completed = add(authoring.completion, "print what lets a shell complete this command's commands and options")
     completed.add_argument("shell", choices=("bash", "zsh"), metavar="SHELL", help="bash or zsh")
-    add(subcommands.show, "print a campaign's file").add_argument("campaign")
+    add(authoring.show, "print a campaign's file").add_argument("campaign")
 
 
 def _count(text: str) -> int:

@@ -19,6 +19,11 @@ EXAMPLES: dict[str, tuple[str, ...]] = {
     "retry": ("campaign retry runs/mine --failed",),
     "report": ("campaign report runs/mine",),
     "compare": ("campaign compare runs/mine --lights white,led-b3",),
+    "export": ("campaign export runs/mine --frames exported",),
+    "score": (
+        "sed '1s/.*/frame,x_mm,y_mm,z_mm,reason/; 2,$s/,.*/,,,,no patch/' exported/index.csv > theirs.csv",
+        "campaign score runs/mine theirs.csv --name mine",
+    ),
     "debug": ("campaign debug runs/mine 1 3",),
     "pack": ("campaign pack runs/mine",),
     "verify": ("campaign verify runs/mine.zip --sample 2",),

@@ -15,26 +15,6 @@ if TYPE_CHECKING:
     from conespot.campaigns.session import Session
 
 
-def init(options: argparse.Namespace) -> Ending:
-    """Write a campaign, or a microscope's scene, from a few answers."""
-    from pathlib import Path
-
-    from conespot.campaigns import new_campaign, new_microscope
-    from conespot.campaigns.questions import answers, refuse_answers
-
-    if options.microscope:
-        refuse_answers(options, new_campaign.QUESTIONS, "campaign; leave --microscope out")
-        path = options.file or Path("my_microscope.yaml")
-        new_microscope.write_microscope(path, answers(options, new_microscope.QUESTIONS))
-        _say(f"{path}: next: campaign localize FRAMES --scene {path}")
-        return Ending.DONE
-    refuse_answers(options, new_microscope.QUESTIONS, "microscope; add --microscope")
-    options.file = options.file or Path("my_campaign.yaml")
-    rows = new_campaign.write_campaign(options.file, answers(options, new_campaign.QUESTIONS))
-    _say(f"{options.file}: {rows} rows; next: campaign plan {options.file}")
-    return Ending.DONE
-
-
 def validate(options: argparse.Namespace) -> Ending:
     """Check a campaign."""
     from conespot.campaigns.plan import make_plan
@@ -56,15 +36,6 @@ def plan(options: argparse.Namespace) -> Ending:
     _say("\n".join(describe(make_plan(document_of(options)), profile.workers if profile else options.workers)))
     if jobs := jobs_in_words(profile):
         _say(jobs)
-    return Ending.DONE
-
-
-def preview(options: argparse.Namespace) -> Ending:
-    """Draw one frame of a campaign, and its set-up."""
-    from conespot.campaigns.preview import preview
-    from conespot.campaigns.settings import document_of
-
-    _say(preview(document_of(options), options.out))
     return Ending.DONE
 
 
@@ -208,59 +179,6 @@ def calibrate(options: argparse.Namespace) -> Ending:
 
     for line in calibrate_own(options.frames, options.scene, options.set, options.out, shape=options.shape):
         _say(line)
-    return Ending.DONE
-
-
-def list(options: argparse.Namespace) -> Ending:
-    """List campaigns, or localizers."""
-    if options.localizers:
-        from conespot.localize.locate import in_words
-
-        for line in in_words():
-            _say(line)
-        return Ending.DONE
-    from conespot.scene.document import read_document, shipped
-
-    for name, path in shipped("campaigns", "").items():
-        _say(f"{name:16} {read_document(path).data.get('description', '')}")
-    return Ending.DONE
-
-
-def show(options: argparse.Namespace) -> Ending:
-    """Print a campaign's file."""
-    from conespot.scene.document import find_document, read_document
-
-    path = find_document(options.campaign, "campaigns", "", "campaign")
-    read_document(path)  # no control characters reach a terminal
-    streams.write(path.read_text("utf-8-sig"))
-    return Ending.DONE
-
-
-def explain(options: argparse.Namespace) -> Ending:
-    """Say what a key means."""
-    from conespot.campaigns.explain import explain
-
-    for line in explain(options.key):
-        _say(line)
-    return Ending.DONE
-
-
-def schema(options: argparse.Namespace) -> Ending:
-    """Print a JSON Schema."""
-    import json
-
-    from conespot.campaigns.json_schema import campaign_schema, scene_schema
-
-    _say(json.dumps(scene_schema() if options.scene else campaign_schema(), indent=1))
-    return Ending.DONE
-
-
-def completion(options: argparse.Namespace) -> Ending:
-    """Print a shell's completion."""
-    from conespot.campaigns.command_line import parser
-    from conespot.campaigns.completion import completion
-
-    streams.write(completion(parser(), options.shell))
     return Ending.DONE
 
 

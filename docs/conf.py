@@ -19,6 +19,7 @@ source_suffix = {".md": "markdown"}
 exclude_patterns = ["_build"]
 myst_enable_extensions = ["dollarmath", "amsmath", "deflist"]
 myst_heading_anchors = 3
+suppress_warnings = ["toc.empty_glob"]  # a pattern is where a page will stand
 default_role = "code"
 autodoc_member_order = "bysource"
 autodoc_typehints = "description"
