@@ -1,5 +1,4 @@
-"""The command line of `campaign`: its commands and their options. What they do is in
-`campaigns.subcommands` and `campaigns.authoring`."""
+"""The command line of `campaign`: its commands and their options. What these do stands in modules of their own."""
 
 from __future__ import annotations
 
@@ -7,7 +6,7 @@ import argparse
 from collections.abc import Callable
 from pathlib import Path
 
-from conespot.campaigns import new_microscope, other_methods, subcommands
+from conespot.campaigns import authoring, new_microscope, other_methods, subcommands
 from conespot.campaigns.ending import Ending
 from conespot.campaigns.examples import epilog
 from conespot.campaigns.machines import add_machines, add_workers
