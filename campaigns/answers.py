@@ -119,6 +119,7 @@ FLAT = (
     "sigma_nearest_mm",
     "along_mm",
     "sigma_along_mm",
+    "source_mm",
     "safe",
     "reason",
 )

@@ -225,6 +225,7 @@ def finding(case: Case, localizer: str, found: Outcome, bound: float | None) -> 
         localizer=localizer,
         distance=ways,
         distance_sigma=sigmas,
+        distance_source=0.0 if found.distance is None else found.distance.source_mm,
         apex=found.apex_mm.tolist(),
         axis=found.axis.tolist(),
         roll=found.roll,

@@ -50,6 +50,7 @@ class Finding(_Line):
     #: from the wall's nearest point and along the axis [mm], and their standard deviations [mm] where they are known
     distance: tuple[FiniteFloat, FiniteFloat] | None = None
     distance_sigma: tuple[_Sigma, _Sigma] | None = None
+    distance_source: _Sigma = 0.0  #: by which a source that is no point may pass for farther away [mm]
     bound: Annotated[FiniteFloat, Field(ge=0.0)] | None = None  #: root mean square tip error no estimator beats [mm]
 
     @model_validator(mode="after")
@@ -170,6 +171,7 @@ class Stated:
         if self.distance:
             nearest, along = (found and found.distance) or (_NAN, _NAN)
             sigmas = (found and found.distance_sigma) or (_NAN, _NAN)
+            row["est_source_mm"] = _NAN if found is None or found.distance is None else found.distance_source
             true_nearest, true_along = wall or (_NAN, _NAN)
             for name, pair in {
                 "true_{}_mm": (true_nearest, true_along),

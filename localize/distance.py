@@ -32,8 +32,10 @@ def distance_of(estimate: Estimate, covariance: Array | None, knowns: Knowns, *,
     """
     wall = Wall.about(estimate.scene, estimate.pose.apex, estimate.pose.axis)
     along, nearest = (float(value) for value in wall.distances)
+    beam = estimate.scene.beam
+    source = beam.source_diameter / 2.0 / math.tan(beam.half_angle)
     if covariance is None or not math.isfinite(along):
-        return Distance(along, nearest)
+        return Distance(along, nearest, source_mm=source)
     size = estimate.pose_size if joint else len(covariance)
     free = tuple(each for each in knowns.free if each.changes == "sight")
     jacobian = np.zeros((2, len(covariance)))
@@ -47,7 +49,7 @@ def distance_of(estimate: Estimate, covariance: Array | None, knowns: Knowns, *,
             variance += np.square(sigma * change)
     variance += np.einsum("ij,jk,ik->i", jacobian, covariance, jacobian)
     sigmas = np.sqrt(np.maximum(variance, 0.0))
-    return Distance(along, nearest, float(sigmas[0]), float(sigmas[1]))
+    return Distance(along, nearest, float(sigmas[0]), float(sigmas[1]), source)
 
 
 def _by_quantity(wall: Wall, estimate: Estimate, quantity: Quantity) -> Array:
@@ -90,7 +92,5 @@ class Alarm:
         """Whether the bound of the nearest distance lies above; never of a refused frame, nor without a sigma."""
         if not isinstance(outcome, Localization) or outcome.distance is None:
             return False
-        found = outcome.distance
-        if found.sigma_nearest_mm is None:
-            return False
-        return found.nearest_mm - self.sigmas * found.sigma_nearest_mm > self.least_mm
+        beyond = outcome.distance.beyond(self.sigmas)
+        return beyond is not None and beyond > self.least_mm

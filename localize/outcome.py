@@ -31,13 +31,21 @@ class Distance:
     """How far the tip is from the wall [mm]: along the needle's axis, and from its nearest point; negative behind it.
 
     The standard deviations [mm] hold the pose's, its correlation with what else the fit left free, and how well the
-    wall is known; None where the localizer states no covariance. Research, no safety device.
+    wall is known; None where the localizer states no covariance. `source_mm` is by how much a source that is no point
+    may pass for one that is farther away: on a clipped patch its width adds to the cone's. Research, no safety device.
     """
 
     along_mm: float
     nearest_mm: float
     sigma_along_mm: float | None = None
     sigma_nearest_mm: float | None = None
+    source_mm: float = 0.0
+
+    def beyond(self, sigmas: float) -> float | None:
+        """What the nearest distance is beyond [mm], so many standard deviations aside; None without one."""
+        if self.sigma_nearest_mm is None:
+            return None
+        return self.nearest_mm - self.source_mm - sigmas * self.sigma_nearest_mm
 
 
 @dataclass(frozen=True, eq=False)

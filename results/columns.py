@@ -91,6 +91,7 @@ COLUMNS = (
     *_distances("true_{}_mm", "distance of the true tip {}", least=-math.inf),
     *_distances("est_{}_mm", "distance of the found tip {}", least=-math.inf),
     *_distances("est_sigma_{}_mm", "standard deviation of the distance {}", least=0.0),
+    _stated("est_source_mm", "mm", "by how much a source that is no point may pass for farther from the wall", 0.0),
     *_distances("est_error_{}_mm", "found minus true distance {}", least=-math.inf),
     _stated("est_bound_mm", "mm", "root mean square tip error that no unbiased localizer beats", 0.0),
 )

@@ -25,11 +25,15 @@ ALARM_MM, FALSE_SAFE = 0.1, 1e-3
 _EDGES = (0.0, 0.1, 0.2, 0.35, 0.5, 0.75, 1.0)
 #: sigmas on either side of a 95 % interval, and above the bound of the alarm
 _TWO_SIDED, _ONE_SIDED = NormalDist().inv_cdf(0.975), NormalDist().inv_cdf(1.0 - FALSE_SAFE)
-_NEEDED = {"true_nearest_mm", *(f"est_{kind}{way}_mm" for kind in ("", "sigma_", "error_") for way in DISTANCE)}
+_NEEDED = {
+    "true_nearest_mm",
+    "est_source_mm",
+    *(f"est_{kind}{way}_mm" for kind in ("", "sigma_", "error_") for way in DISTANCE),
+}
 _NOTES = (
     "held: share of the 95 % intervals that hold the true distance, from the nearest point and along the axis. Safe: "
-    f"the one-sided bound of the nearest lies above {ALARM_MM:g} mm, false with a chance of {FALSE_SAFE:g} by its "
-    "sigma; a refused frame is not safe.",
+    f"the one-sided bound of the nearest, less what the source's width may pass for, lies above {ALARM_MM:g} mm, false "
+    f"with a chance of {FALSE_SAFE:g} by its sigma; a refused frame is not safe.",
     "False safe: called so with the true tip nearer than that; with the upper end of its 95 % interval, of such frames "
     "(Clopper and Pearson). Research, no safety device.",
 )
@@ -71,7 +75,8 @@ def near_wall(rows: pd.DataFrame) -> dict[str, float]:
     """Numbers of some rows; NaN where nothing was localized."""
     good = rows[rows["status"] == "ok"]
     held = {way: np.abs(good[f"est_error_{way}_mm"]) <= _TWO_SIDED * good[f"est_sigma_{way}_mm"] for way in DISTANCE}
-    safe = good["est_nearest_mm"] - _ONE_SIDED * good["est_sigma_nearest_mm"] > ALARM_MM
+    beyond = good["est_nearest_mm"] - good["est_source_mm"] - _ONE_SIDED * good["est_sigma_nearest_mm"]
+    safe = beyond > ALARM_MM
     below = int(np.count_nonzero(rows["true_nearest_mm"] <= ALARM_MM))
     false = int(np.count_nonzero(safe & (good["true_nearest_mm"] <= ALARM_MM)))
     return {

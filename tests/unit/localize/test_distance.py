@@ -8,6 +8,7 @@ from conespot.localize.model.estimate import Estimate
 from conespot.localize.model.knowns import Knowns
 from conespot.localize.outcome import Distance, Localization, LocalizationFailure
 from conespot.scene import InputError, Pose, Scene
+from conespot.scene.beam import HardBeam
 from conespot.scene.wall import Wall
 
 SCENE = Scene()
@@ -73,6 +74,16 @@ def test_a_refused_frame_and_an_answer_without_a_sigma_are_not_safe():
     assert not alarm.safe(LocalizationFailure("nothing found"))
     assert not alarm.safe(Localization(POSE.apex, POSE.axis))
     assert not safe(5.0, None)
+
+
+def test_a_source_that_is_no_point_may_pass_for_one_farther_away_and_an_alarm_counts_on_it():
+    """A core of 0.1 mm in a cone of 9 deg: by 0.05 mm over its tangent, which a clipped patch in `theatre` showed."""
+    wide = SCENE.model_copy(update={"beam": HardBeam(source_diameter=0.1)})
+    found = distance_of(Estimate(POSE, wide), JOINT[:5, :5], Knowns(), joint=True)
+    assert found.source_mm == pytest.approx(0.05 / np.tan(np.radians(9.0)))
+    assert found.beyond(3.0) == pytest.approx(found.nearest_mm - 3.0 * found.sigma_nearest_mm - found.source_mm)
+    assert Alarm(0.1).safe(Localization(POSE.apex, POSE.axis, distance=Distance(0.44, 0.44, 0.01, 0.01)))
+    assert not Alarm(0.1).safe(Localization(POSE.apex, POSE.axis, distance=Distance(0.44, 0.44, 0.01, 0.01, 0.3157)))
 
 
 def test_a_chance_that_is_none_is_refused():
