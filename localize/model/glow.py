@@ -46,8 +46,8 @@ class GlowSettings:
     #: share of the deep light that may be lost at the map's border
     lost: float = 0.01
     #: as far as the tip [mm], the axis and a roll [rad] and the kernel's length (its logarithm) move, deep light is
-    #: taken to change in proportion: it is as smooth as the kernel is wide
-    straight: tuple[float, float, float] = (0.02, 0.004, 0.05)
+    #: taken to change in proportion: at a hard rim a place is off by up to 1 % after half of that
+    straight: tuple[float, float, float] = (0.004, 0.001, 0.05)
 
 
 GLOW = GlowSettings()
