@@ -17,6 +17,7 @@ from conespot.localize.locate import localizer_names
 from conespot.scene.document import shipped
 from conespot.scene.identity import defaults
 from conespot.scene.keys import meaning, quantity_of, summary
+from conespot.scene.scene import KNOWLEDGE
 
 _DIALECT = "https://json-schema.org/draft/2020-12/schema"
 #: keys that a file may have and no description holds: they are resolved while it is read
@@ -51,9 +52,12 @@ def campaign_schema() -> dict[str, Any]:
 
 
 def scene_schema() -> dict[str, Any]:
-    """The JSON Schema of a scene's file, such as a preset."""
+    """The JSON Schema of a scene's file, such as a preset, which may say how well it is known (`campaign localize`)."""
     schema = _described()
-    return {"$schema": _DIALECT, "title": "conespot scene", "$defs": schema["$defs"], **schema["$defs"]["Scene"]}
+    scene = schema["$defs"]["Scene"]
+    known = {KNOWLEDGE: {"$ref": "#/$defs/Knowledge", "description": "how well the scene's quantities are known"}}
+    scene = {**scene, "properties": {**scene["properties"], **known}}
+    return {"$schema": _DIALECT, "title": "conespot scene", "$defs": schema["$defs"], **scene}
 
 
 def _described() -> dict[str, Any]:

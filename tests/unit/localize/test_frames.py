@@ -1,5 +1,7 @@
 """localize.frames: pictures and videos from outside are the sensor's frames, or are refused with the key to write."""
 
+import struct
+
 import cv2
 import numpy as np
 import pytest
@@ -198,3 +200,17 @@ def test_what_begins_like_no_image_and_what_is_no_file_are_one_sentence(tmp_path
     }.items():
         with pytest.raises(InputError, match=said):
             read(tmp_path / name)
+
+
+def test_a_videos_display_matrix_is_obeyed(tmp_path):
+    """As a telephone that was held upright writes it: turn the picture clockwise (ISO 14496-12, 8.3.2)."""
+    film = write_film(tmp_path / "x.mp4", [np.repeat(np.linspace(40, 200, 40, dtype=np.uint8)[:, None], 30, 1)] * 2,
+                      "libx264", "yuv420p")  # fmt: skip
+    plain = struct.pack(">9i", 1 << 16, 0, 0, 0, 1 << 16, 0, 0, 0, 1 << 30)
+    turned = struct.pack(">9i", 0, 1 << 16, 0, -(1 << 16), 0, 0, 40 << 16, 0, 1 << 30)
+    data, track = film.read_bytes(), film.read_bytes().index(b"tkhd")
+    assert plain in data[track:]
+    film.write_bytes(data[:track] + data[track:].replace(plain, turned, 1))
+    upright = read(film, **LIMITED)
+    assert upright.shape == (30, 40)
+    assert np.all(np.diff(upright.astype(int).mean(axis=0)) < 0)  # what was at the top is to the right
