@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 
 from conespot.localize import SensorNoise, locate
-from conespot.localize.model.forward import look
+from conespot.localize.model.sight import look
 from conespot.localize.theory.bounds import patch_pixels
 from conespot.scene.beam import CyclesBeam, HardBeam
 from conespot.scene.camera import Camera

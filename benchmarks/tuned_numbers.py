@@ -21,9 +21,10 @@ from conespot.localize import Knowns, Localization, Reference, SensorNoise, loca
 from conespot.localize.edge.settings import EDGE
 from conespot.localize.field.settings import FIELD
 from conespot.localize.image import Frame
-from conespot.localize.model.forward import ambient_irradiance, light, look, window
+from conespot.localize.model.forward import ambient_irradiance, light
 from conespot.localize.model.profile import Profile
 from conespot.localize.model.residual import RESIDUAL
+from conespot.localize.model.sight import look, window
 from conespot.localize.model.solve import STEP
 from conespot.localize.model.view import VIEW
 from conespot.localize.outcome import Outcome

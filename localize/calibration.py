@@ -57,6 +57,7 @@ class CalibrationSettings:
         rcm_sigma_mm=0.02,
         half_angle_sigma_deg=0.003,
         softness_sigma=0.01,
+        blur_sigma_mm=0.0,
         eye_radius_sigma_mm=0.01,
         camera_height_sigma_mm=0.03,
         semi_axes_sigma_mm=0.01,

@@ -8,6 +8,8 @@ What remains is the position of the beam's own profile.
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
+from copy import copy
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -16,21 +18,34 @@ from numpy.typing import NDArray
 from conespot.localize.edge.nuisances import Nuisances, first_gain, gain_over
 from conespot.localize.edge.ribbon import Ribbon
 from conespot.localize.edge.sandwich import EdgeFit
-from conespot.localize.edge.settings import EDGE, Level
+from conespot.localize.edge.settings import EDGE
 from conespot.localize.edge.strips import Eliminated, score_covariance
 from conespot.localize.edge.surroundings import surroundings
 from conespot.localize.image import Frame, Reference
 from conespot.localize.model.deep import Deep
+from conespot.localize.model.doubt import contradicted
 from conespot.localize.model.estimate import Estimate
-from conespot.localize.model.forward import ambient_irradiance, look
+from conespot.localize.model.forward import ambient_irradiance
+from conespot.localize.model.irradiance import Irradiance, Lights
 from conespot.localize.model.knowns import Knowns
 from conespot.localize.model.noise import NoiseModel
 from conespot.localize.model.prior import prior_rows
+from conespot.localize.model.sight import look
 from conespot.localize.model.solve import limited, reduction, solved
-from conespot.localize.model.view import Irradiance, Lights
 from conespot.localize.outcome import COVERED, UNCERTAIN, LocalizationFailure
 
 Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Stage:
+    """Bins of `side` x `side` px up to `inner` bins inside the outlines and `outer` outside, and when a fit is done."""
+
+    side: int
+    inner: float
+    outer: float
+    iterations: int  #: at most
+    enough: float  #: a step that is shorter ends them [sigmas of uncorrelated residuals]
 
 
 @dataclass(frozen=True)
@@ -38,6 +53,7 @@ class BandFit(EdgeFit):
     """A fitted band."""
 
     channels: tuple[Nuisances, ...]
+    contradicted: bool  #: whether the band shows what was taken as told to be otherwise
 
     @property
     def gains(self) -> tuple[float, ...]:
@@ -73,21 +89,20 @@ def fit_band(
     noise: NoiseModel,
     reference: Reference | None,
     *,
-    side: int,
-    level: Level,
-    enough: float,
+    stage: Stage,
     tied: bool = False,
+    doubted: Knowns | None = None,
 ) -> BandFit | LocalizationFailure:
-    """Fit the pose to bins of `side` x `side` px in the band along the outlines that `level` describes.
+    """Fit the pose to the bins of a stage.
 
-    Gain and spreads of the albedo start from those of the fit `before`, or from the band itself and a usual retina. A
-    step shorter than `enough` sigmas of uncorrelated residuals ends the iterations. With `tied` the axis stays on the
-    RCM. A `reference` tells the albedo as far as it shows it.
+    Gain and spreads of the albedo start from those of the fit `before`, or from the band itself and a usual retina.
+    With `tied` the axis stays on the RCM. A `reference` tells the albedo as far as it shows it. What is `doubted`
+    leaves more free than `knowns` do: whether the band contradicts them is asked at the end.
     """
-    nominal, estimate = start.scene, start
+    nominal, estimate, side = start.scene, start, stage.side
     size = start.pose_size + len(knowns.free)
     used = replace(knowns, rcm_sigma_mm=0.0) if tied else knowns
-    band = Ribbon.along(frame, estimate, side=side, inner=level.inner, outer=level.outer)
+    band = Ribbon.along(frame, estimate, side=side, inner=stage.inner, outer=stage.outer)
     if band is None:
         return LocalizationFailure(COVERED)
     if reference is not None:
@@ -102,25 +117,17 @@ def fit_band(
         begin = [(gain, usual, told) for gain, told in _first_gains(frame, estimate, band, irradiance, lights)]
     else:
         begin = [(c.gain, c.spread * [1.0, side / math.sqrt(c.pixels)], c.told) for c in before.channels]
-    smallest = np.array([EDGE.smallest, EDGE.smallest / (level.inner + level.outer)])
+    smallest = np.array([EDGE.smallest, EDGE.smallest / (stage.inner + stage.outer)])
     channels = [
         Nuisances(shown, band.strips, noise, side**2, gain, spread, smallest, told=told)
         for shown, (gain, spread, told) in zip(band.shown, begin, strict=True)
     ]
     information, pj, step = np.eye(size), np.zeros((0, size)), np.zeros(size)
-    for turn in range(level.iterations):
+    for turn in range(stage.iterations):
         if turn:
             lights = shed(estimate)
         pr, pj = prior_rows(estimate, nominal, used)
-        information, gradient = pj.T @ pj, -pj.T @ pr
-        parts = []
-        for c, channel in enumerate(channels):
-            channel.evaluate(irradiance, *lights[c])
-            part = channel.eliminated(size)
-            reduced = reduction(part.information, size)
-            parts.append(part)
-            information = information + reduced @ part.information @ reduced.T
-            gradient = gradient + reduced @ part.gradient
+        information, gradient, parts = _equations(channels, irradiance, lights, (pr, pj))
         found = solved(information, gradient)
         if found is None:
             return LocalizationFailure(UNCERTAIN)
@@ -129,9 +136,36 @@ def fit_band(
         for channel, part in zip(channels, parts, strict=True):
             channel.learn(part, _with_own(part, step))
         length = float(step @ information @ step)
-        if length < enough**2 and turn >= 2:
+        if length < stage.enough**2 and turn >= 2:
             break
-    return BandFit(estimate, information, pj, step, band.covered, tuple(channels))
+    doubt = False
+    if doubted is not None:
+        free = replace(doubted, rcm_sigma_mm=used.rcm_sigma_mm)
+        # the channels stay as they are
+        seen, prior = [copy(channel) for channel in channels], prior_rows(estimate, nominal, free)
+        own, pull, _ = _equations(seen, irradiance, shed(estimate, free), prior)
+        doubt = contradicted(own, pull, estimate, free)
+    return BandFit(estimate, information, pj, step, band.covered, tuple(channels), doubt)
+
+
+def _equations(
+    channels: Sequence[Nuisances], irradiance: Array, lights: Lights, prior: tuple[Array, Array]
+) -> tuple[Array, Array, list[Eliminated]]:
+    """Information `[P, P]` and gradient `[P]` of what the channels share, and each with its own still in it.
+
+    They are lit by the ambient irradiance `[N]` and the spotlights'; the `prior` are residuals and rows.
+    """
+    pr, pj = prior
+    information, gradient = pj.T @ pj, -pj.T @ pr
+    size, parts = len(gradient), []
+    for c, channel in enumerate(channels):
+        channel.evaluate(irradiance, *lights[c])
+        part = channel.eliminated(size)
+        reduced = reduction(part.information, size)
+        parts.append(part)
+        information = information + reduced @ part.information @ reduced.T
+        gradient = gradient + reduced @ part.gradient
+    return information, gradient, parts
 
 
 def _first_gains(

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from conespot.localize.edge.band import BandFit, fit_band
+from conespot.localize.edge.band import BandFit, Stage, fit_band
 from conespot.localize.edge.sandwich import EdgeFit
 from conespot.localize.edge.saturated import SaturatedFit, fit_saturated
 from conespot.localize.edge.settings import EDGE, Level
@@ -13,7 +13,7 @@ from conespot.localize.model.estimate import Estimate
 from conespot.localize.model.knowns import Knowns
 from conespot.localize.model.noise import NoiseModel
 from conespot.localize.model.profile import Profile
-from conespot.localize.model.view import outlines
+from conespot.localize.model.view import edge_width, outlines
 from conespot.localize.outcome import COVERED, UNCERTAIN, LocalizationFailure
 from conespot.scene.scene import Scene
 
@@ -54,30 +54,46 @@ def fit_edge(
     size = float(np.max(np.ptp(points, axis=0))) / (1.0 if len(start.scene.spotlights) == 1 else 2.0)
     sharp, clipped = is_sharp(start.scene), _clipped_share(frame, start)
     if sharp and clipped > EDGE.throughout:
-        return _throughout(frame, start, knowns, size)
+        return _throughout(frame, start, knowns.as_told, size)
     full = sharp or clipped > EDGE.clipped
     fit: BandFit | None = None
-    stages = _stages(EDGE.rim if full else EDGE.soft, size)
-    for number, (side, level) in enumerate(stages):
-        enough = EDGE.enough[number + 1 == len(stages)]
-        found = fit_band(
-            frame, start, fit, knowns, noise, reference, side=side, level=level, enough=enough, tied=number == 0
-        )
-        if isinstance(found, LocalizationFailure):
-            # what starts inside the frame and leaves it has run off
-            return LocalizationFailure(UNCERTAIN) if number else found
-        fit, start = found, found.estimate
+    used = knowns.as_told
+    levels = _levels(EDGE.rim if full else EDGE.soft, size)
+    for number, level in enumerate(levels):
+        last = number + 1 == len(levels)
+        while True:
+            found = fit_band(
+                frame, start, fit, used, noise, reference, stage=_stage(level, size, edge_width(start), last=last),
+                tied=number == 0, doubted=knowns if used != knowns else None,
+            )  # fmt: skip
+            if isinstance(found, LocalizationFailure):
+                # what starts inside the frame and leaves it has run off
+                return LocalizationFailure(UNCERTAIN) if number else found
+            fit, start = found, found.estimate
+            if not found.contradicted:
+                break
+            used = knowns
     assert fit is not None
     return fit
 
 
-def _stages(levels: tuple[Level, ...], size: float) -> list[tuple[int, Level]]:
-    """The levels with the sides of their bins [px] on a patch of `size` [px].
+def _levels(levels: tuple[Level, ...], size: float) -> list[Level]:
+    """The levels for a patch of `size` [px].
 
     Where the last takes every pixel, coarser ones whose bins would be pixels too are left out.
     """
-    stages = [(1 if level.bins is None else max(1, int(size / level.bins)), level) for level in levels]
-    return [stage for stage in stages if stage[0] > 1 or stage[1].bins is None or levels[-1].bins is not None]
+    every = levels[-1].bins is not None
+    return [level for level in levels if every or level.bins is None or int(size / level.bins) > 1]
+
+
+def _stage(level: Level, size: float, width: float, *, last: bool) -> Stage:
+    """The bins of a level on a patch of `size` [px], and the band of an edge that is `width` [px] wide."""
+    side = 1 if level.bins is None else max(1, int(size / level.bins))
+    if last:
+        # bins half as wide as the blur see all of it
+        side = max(side, int(EDGE.bins_a_width * width))
+    reach = EDGE.widths * width / side
+    return Stage(side, level.inner + reach, level.outer + reach, level.iterations, EDGE.enough[last])
 
 
 def _throughout(frame: Frame, start: Estimate, knowns: Knowns, size: float) -> SaturatedFit | LocalizationFailure:

@@ -122,7 +122,8 @@ def gain_over(shown: Shown, irradiance: Array, light: Array, offset: Array, arou
 def first_gain(shown: Shown, irradiance: Array, light: Array, offset: Array) -> float:
     """Log of the spotlights' intensity over the ambient irradiance from the two sides of a band."""
     signal, usable = shown.signal / np.exp(shown.template), shown.usable
-    inside, outside = usable & (light > 0.0) & (offset < -1.0), usable & (light <= 0.0) & (offset > 1.0)
+    dark = light <= EDGE.dark * float(light.max(initial=0.0))
+    inside, outside = usable & ~dark & (offset < -1.0), usable & dark & (offset > 1.0)
     if np.count_nonzero(inside) < 5 or np.count_nonzero(outside) < 5:
         return math.log(1e3 / max(float(light.max(initial=0.0)), 1e-9))
     albedo = max(float(np.median(signal[outside] / irradiance[outside])), 1e-6)

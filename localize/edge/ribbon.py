@@ -13,10 +13,10 @@ from conespot.localize.edge.settings import EDGE
 from conespot.localize.edge.strips import WIDTH, Strips
 from conespot.localize.image import Frame, Reference
 from conespot.localize.model.estimate import Estimate
-from conespot.localize.model.forward import look
 from conespot.localize.model.noise import NoiseModel
 from conespot.localize.model.occlusion import covered
 from conespot.localize.model.outline import distances
+from conespot.localize.model.sight import look
 from conespot.localize.model.view import Shown, Window, log_albedo
 from conespot.scene.scene import Scene
 from conespot.scene.spotlights import spotlight_axes

@@ -46,11 +46,17 @@ class EdgeSettings:
     #: change no answer here. Bins of a twentieth gain 41 %, 7 bins inside instead of 14 gain 31 % on these few frames;
     #: the first level is not critical
     soft: tuple[Level, ...] = (Level(30, 6.0, 2.0, 6), Level(40, 14.0, 3.0, 16))
+    #: standard deviations of what spreads the image by which a band is wider on either side, and bins of the last level
+    #: for each of them
+    widths: float = 3.0
+    bins_a_width: float = 0.5
     #: a step this short [sigmas of uncorrelated residuals] ends a level that others follow, and the last one: what is
     #: left is below the noise. Not critical
     enough: tuple[float, float] = (1.0, 0.3)
     #: bins without which a band is too short: eight for each parameter. No answer changes
     fewest_bins: int = 40
+    #: share of the light in a band below which a bin counts as unlit, where a blur has no end
+    dark: float = 1e-3
     #: where the strips' spreads of log albedo start, of levels and of slopes [1/mm]; then they are learnt. Those of a
     #: fundus in green. Not critical
     level: float = 0.3

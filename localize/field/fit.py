@@ -6,6 +6,7 @@ Every spotlight has a window of its own, with an albedo of its own; pose and gai
 from __future__ import annotations
 
 from collections.abc import Sequence
+from copy import copy
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -15,6 +16,7 @@ from conespot.localize.field.albedo import Modes
 from conespot.localize.field.piece import Piece
 from conespot.localize.field.settings import FIELD, Level
 from conespot.localize.image import Frame, Reference
+from conespot.localize.model.doubt import contradicted
 from conespot.localize.model.estimate import Estimate
 from conespot.localize.model.knowns import Knowns
 from conespot.localize.model.noise import NoiseModel
@@ -22,6 +24,7 @@ from conespot.localize.model.prior import prior_rows
 from conespot.localize.model.solve import STEP, inverse, limited
 from conespot.localize.model.view import Bins, Shown, Window, log_albedo, visible
 from conespot.localize.outcome import COVERED, UNCERTAIN, LocalizationFailure
+from conespot.scene.scene import Scene
 
 Array = NDArray[np.float64]
 
@@ -38,6 +41,7 @@ class FieldFit:
     misfit: float  #: rms of the lit bins' residuals, outliers cut, over what the model expects
     settled: bool  #: whether the last step was small
     lit_share: float  #: share of the predicted patches that the frame shows and that is not clipped
+    contradicted: bool  #: whether the windows show what was taken as told to be otherwise
 
 
 def fit_patch(
@@ -45,12 +49,18 @@ def fit_patch(
 ) -> FieldFit | LocalizationFailure:
     """The fit, coarse to fine, or why there is none."""
     fit: FieldFit | None = None
+    used = knowns.as_told
     for level in FIELD.levels:
-        found = fit_field(frame, start, fit, knowns, noise, reference, level)
-        if isinstance(found, LocalizationFailure):
-            # what starts inside the frame and leaves it has run off
-            return found if fit is None else LocalizationFailure(UNCERTAIN)
-        fit, start = found, found.estimate
+        while True:
+            doubted = knowns if used != knowns else None
+            found = fit_field(frame, start, fit, used, noise, reference, level, doubted)
+            if isinstance(found, LocalizationFailure):
+                # what starts inside the frame and leaves it has run off
+                return found if fit is None else LocalizationFailure(UNCERTAIN)
+            fit, start = found, found.estimate
+            if not found.contradicted:
+                break
+            used = knowns
     assert fit is not None
     return fit
 
@@ -63,11 +73,13 @@ def fit_field(
     noise: NoiseModel,
     reference: Reference | None,
     level: Level,
+    doubted: Knowns | None = None,
 ) -> FieldFit | LocalizationFailure:
     """Fit pose, gain and albedo to windows as fine as the `level` says, from `start`.
 
     The first iterations may keep the axis on the RCM, so that a poor start cannot run off along the soft directions of
-    a free fit. `before` is a coarser fit, to start its albedo and gain from.
+    a free fit. `before` is a coarser fit, to start its albedo and gain from. What is `doubted` leaves more free than
+    `knowns` do: whether the windows contradict them is asked at the end.
     """
     nominal, estimate = start.scene, start
     size = start.pose_size + len(knowns.free)
@@ -101,6 +113,11 @@ def fit_field(
         settled = length < STEP.settled_sigmas
         if length < FIELD.done_sigmas and count >= max(level.tied, 1):
             break
+    doubt = False
+    if doubted is not None:
+        seen = [piece.bins.spotlight(estimate, doubted)[lead] for piece in pieces]
+        # the pieces stay as they are
+        doubt = _contradicted([copy(piece) for piece in pieces], seen, gain, estimate, nominal, doubted)
     own = information[size, :size]
     data = information[:size, :size] - np.outer(own, own) / max(information[size, size], 1e-12) - prior
     return FieldFit(
@@ -112,6 +129,32 @@ def fit_field(
         float(np.sqrt(np.mean([piece.misfit**2 for piece in pieces]))),
         settled,
         visible(estimate) * float(np.mean([piece.unclipped() for piece in pieces])),
+        doubt,
+    )
+
+
+def _contradicted(
+    pieces: Sequence[Piece],
+    lights: Sequence[tuple[Array, Array]],
+    gain: float,
+    estimate: Estimate,
+    nominal: Scene,
+    knowns: Knowns,
+) -> bool:
+    """Whether the windows show that to be otherwise which is taken as told, and which `knowns` leave free."""
+    residuals, rows = prior_rows(estimate, nominal, knowns)
+    equations = _equations(pieces, lights, gain, rows.T @ rows, -rows.T @ residuals)
+    if equations is None:
+        return False
+    information, _, _ = equations
+    gradient = information @ equations[2]
+    size = len(gradient) - 1
+    own = information[:size, size] / max(information[size, size], 1e-300)
+    return contradicted(
+        information[:size, :size] - np.outer(own, information[size, :size]),
+        gradient[:size] - own * gradient[size],
+        estimate,
+        knowns,
     )
 
 

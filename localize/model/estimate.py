@@ -45,6 +45,10 @@ class Estimate:
             found.append((more, less, 2.0 * each.step))
         return found
 
+    def wider(self, free: tuple[Quantity, ...]) -> list[tuple[Scene, float]]:
+        """The scene with a little more of each free quantity that spreads the image, and how much more."""
+        return [(self.beside(each, each.step), each.step) for each in free if each.changes == "spread"]
+
     def moved(self, step: Array, free: tuple[Quantity, ...]) -> Estimate:
         """The estimate after `step`: pose parameters first, then the free quantities."""
         scene = self.scene

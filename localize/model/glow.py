@@ -21,8 +21,9 @@ from numpy.typing import NDArray
 
 from conespot.localize.model.deep import Deep
 from conespot.localize.model.estimate import Estimate
-from conespot.localize.model.forward import Light, Sight, light, rotation_basis
+from conespot.localize.model.forward import Light, light, rotation_basis
 from conespot.localize.model.quantity import Quantity
+from conespot.localize.model.sight import Sight
 from conespot.scene.chart import Chart
 from conespot.scene.pose import Pose
 from conespot.scene.scene import Scene
@@ -181,7 +182,7 @@ def _cells(chart: Chart, scene: Scene, pose: Pose) -> tuple[Sight, NDArray[np.in
     normals = scene.surface.normals(scene.eye, chart.cells.reshape(-1, 3)[lit])
     by_row, by_column = np.gradient(points, axis=(0, 1))
     place, along, across = (plane.reshape(-1, 3)[lit] for plane in (points, by_column, by_row))
-    return Sight(place, normals, along, across), lit
+    return Sight(place, normals, along, across, chart.cell / scene.camera.pixel_pitch), lit
 
 
 def _reading(chart: Chart, places: Array) -> scipy.sparse.csr_array:

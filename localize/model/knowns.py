@@ -31,6 +31,9 @@ class Knowns:
     rcm_sigma_mm: float | None = RCM_SIGMA_MM
     half_angle_sigma_deg: float | None = 0.0
     softness_sigma: float | None = 0.0  #: of a `cycles` beam's blend
+    #: of the lens' residual blur, with what else spreads the image alike: the square of its width may be off by the
+    #: square of this. A frame that does not contradict what is told of it is fitted with that
+    blur_sigma_mm: float | None = None
     eye_radius_sigma_mm: float | None = 0.0
     camera_height_sigma_mm: float | None = 0.0
     #: of each of the retina's semi-axes: `scene.population.SEMI_AXES_SIGMA_MM` about the mean eye for an unknown one
@@ -60,9 +63,14 @@ class Knowns:
         """The scene's quantities that join the fit, in the order of its parameters."""
         return tuple(each for each in QUANTITIES if self.sigma(each) != 0.0)
 
+    @property
+    def as_told(self) -> Knowns:
+        """The same with a blur that is free taken as it is told, until a frame contradicts that."""
+        return replace(self, blur_sigma_mm=0.0) if self.blur_sigma_mm is None else self
+
     def sigma(self, quantity: Quantity) -> float | None:
         """Sigma of a quantity in the unit held inside; None if it is free, 0 if it is usual and nobody says where."""
         own: float | str | None = getattr(self, quantity.known)
         if own is None:
             return None
-        return 0.0 if isinstance(own, str) else own * quantity.per_unit
+        return 0.0 if isinstance(own, str) else (own * quantity.per_unit) ** quantity.power

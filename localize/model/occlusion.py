@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from conespot.localize.model.forward import look
+from conespot.localize.model.sight import look
 from conespot.scene.pose import Pose
 from conespot.scene.scene import Scene
 from conespot.scene.spotlights import Shaft

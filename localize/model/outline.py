@@ -6,9 +6,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from conespot.localize.model.estimate import Estimate
-from conespot.localize.model.forward import look, rotation_basis
+from conespot.localize.model.forward import rotation_basis
 from conespot.localize.model.knowns import Knowns
 from conespot.localize.model.prior import prior_rows
+from conespot.localize.model.sight import look
 from conespot.localize.model.solve import Problem, Solution, minimize
 from conespot.scene.pose import Pose
 from conespot.scene.scene import Scene
@@ -56,7 +57,7 @@ def outline_problem(
         r, jac, by_angle = distances(pixels, spots, estimate)
         columns = [jac]
         for quantity in knowns.free:
-            if quantity.changes == "beam":
+            if quantity.changes != "sight":
                 columns.append(by_angle[:, None] * quantity.widens)
                 continue
             step = _FINER * quantity.step
@@ -88,13 +89,14 @@ def fit_outline(
     None if there are fewer points than parameters or the fit is singular.
     """
     points = np.asarray(pixels, float)
+    knowns = knowns.as_told  # an outline shows no blur
     which = np.zeros(len(points), np.intp) if spots is None else spots
     pose = start if start is not None else start_pose(points, which, scene)
     if pose is None or len(points) < 6:
         return None
     first = Estimate(pose, scene)
     if start is None:
-        exact = Knowns(rcm_sigma_mm=1e-3)
+        exact = Knowns(rcm_sigma_mm=1e-3).as_told
         tied = minimize(outline_problem(points, which, 1.0, scene, exact), first, (), robust=robust)
         if tied is None:
             return None

@@ -54,6 +54,11 @@ class Profile:
         slopes = np.append(np.diff(g) / np.diff(w), 0.0)
         return cls(w, np.stack([g, slopes], axis=1), False, angles[-1])
 
+    @property
+    def begins_with_a_step(self) -> bool:
+        """Whether the light jumps at the edge of the cone."""
+        return bool(self.coefficients[0, 0] > 0.0)
+
     def variable(self, cosine: Array) -> tuple[Array, Array | float]:
         """w at cosines of the angle off the axis, and |dw / dcosine|."""
         if self.cosine:
@@ -103,6 +108,32 @@ class Profile:
         h = [self._piecewise(self._once, corner) for corner in corners]
         slope[edge] = (h[0] - h[1] - h[2] + h[3]) / area
         return mean, slope
+
+    def curvature(self, w: Array, px: Array, py: Array) -> Array:
+        """The second derivative by w of the mean over a pixel, as `mean` takes it."""
+        found = np.zeros_like(w)
+        at = np.flatnonzero((w >= self.knots[0] - px - py) & (w <= self.knots[-1] + px + py))
+        a, p, q = w[at], px[at], py[at]
+        floor = np.maximum(1e-3 * np.maximum(p, q), 1e-9)
+        p, q = np.maximum(p, floor), np.maximum(q, floor)
+        corners = (a + p + q, a + p - q, a - p + q, a - p - q)
+        g = [self._piecewise(self.coefficients, corner) for corner in corners]
+        found[at] = (g[0] - g[1] - g[2] + g[3]) / (4.0 * p * q)
+        return found
+
+    @cached_property
+    def jumps(self) -> Array:
+        """Coefficients of (w - knot) to the powers 0, 1, ... that each knot adds, the profile being their sum."""
+        found = self.coefficients.copy()
+        for i in range(1, len(self.knots)):
+            gone = self.coefficients[i - 1]
+            between = self.knots[i] - self.knots[i - 1]
+            for d in range(found.shape[1]):
+                powers = [math.comb(n, d) * between ** (n - d) * gone[n] for n in range(d, len(gone))]
+                found[i, d] -= math.fsum(powers)
+        # what is left of a continuous profile's own value is rounding
+        found[1:][np.abs(found[1:]) < 1e-12 * np.abs(self.coefficients).max(axis=0)] = 0.0
+        return found
 
     @cached_property
     def _once(self) -> Array:

@@ -10,7 +10,10 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Literal
 
+from conespot.localize.model.point_spread import lens_variance
 from conespot.scene.document import InputError
+from conespot.scene.lens import Lens
+from conespot.scene.point_spread import WIDEST, GaussianSpread
 from conespot.scene.retina import Fundus, Spread
 from conespot.scene.scene import Scene
 
@@ -25,12 +28,14 @@ class Quantity:
     name: str
     read: Callable[[Scene], float | None]  #: its value; None where the scene has no such thing
     write: Callable[[Scene, float], Scene]  #: the scene with another value
-    #: the beam's profile, what the pixels see (surface, camera), or light that comes back from under the retina
-    changes: Literal["beam", "sight", "glow"]
-    step: float  #: of central differences of the light
+    #: the beam's profile, how the image is spread (lens, core, motion), what the pixels see (surface, camera), or light
+    #: that comes back from under the retina; in this order in the table, as in every Jacobian
+    changes: Literal["beam", "spread", "sight", "glow"]
+    step: float  #: of central differences of the light; of a spread's variance forwards, in which light is linear
     known: str  #: the field of `Knowns` that has its sigma
     per_unit: float = 1.0  #: the unit of that field in the one held inside
     unit: str = ""  #: of that field, as it is written
+    power: int = 1  #: of the field in what is held inside: 2 for the variance of a width
     widens: float = 0.0  #: by how much the outline's angle off the axis grows with it [rad]
     remedy: str = ""  #: what a scene without it should say
 
@@ -77,6 +82,15 @@ def _log(value: float | None) -> float | None:
     return None if value is None else math.log(value)
 
 
+def _with_blur(scene: Scene, new: float) -> Scene:
+    # a variance that noise makes negative is none
+    blur = GaussianSpread(sigma=min(math.sqrt(new), WIDEST / 5.0)) if new > 0.0 else None
+    if blur is None and scene.camera.lens is None:
+        return scene
+    lens = (scene.camera.lens or Lens()).model_copy(update={"blur": blur})
+    return scene.model_copy(update={"camera": scene.camera.model_copy(update={"lens": lens})})
+
+
 #: in the order in which they join the parameters of a fit
 QUANTITIES = (
     Quantity(
@@ -98,6 +112,17 @@ QUANTITIES = (
         step=1e-4,
         known="softness_sigma",
         remedy="describe its beam as a cycles beam",
+    ),
+    Quantity(
+        # the variance: light is linear in it, and at a width of zero it has a slope
+        name="blur",
+        read=lens_variance,
+        write=_with_blur,
+        changes="spread",
+        step=1e-6,
+        known="blur_sigma_mm",
+        unit="mm",
+        power=2,
     ),
     Quantity(
         name="eye_radius",

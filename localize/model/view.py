@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, replace
 
 import cv2
@@ -11,12 +12,14 @@ from numpy.typing import NDArray
 from conespot.localize.image import Frame, Reference
 from conespot.localize.model.deep import Deep
 from conespot.localize.model.estimate import Estimate
-from conespot.localize.model.forward import Light, Sight, ambient_irradiance, light, light_by_surface, look, window
-from conespot.localize.model.glow import DeepLight, Glow
+from conespot.localize.model.forward import ambient_irradiance
+from conespot.localize.model.irradiance import Irradiance, Lights
 from conespot.localize.model.knowns import Knowns
 from conespot.localize.model.noise import NoiseModel
 from conespot.localize.model.occlusion import covered
-from conespot.localize.model.quantity import Quantity
+from conespot.localize.model.rise import Rise
+from conespot.localize.model.sight import look, window
+from conespot.localize.model.spread import Spread
 from conespot.scene.scene import Scene
 from conespot.scene.spotlights import spotlight_axes
 
@@ -32,6 +35,8 @@ class ViewSettings:
     fewest_bins: int = 6
     #: bins by which outlines may still move once the light has its place; a level ends within two. No answer changes
     reach: int = 4
+    #: standard deviations of what spreads the image by which its light reaches farther: a normal distribution's end
+    widths: float = 4.0
     #: variance of the log albedo that a retina has within a bin or two: a reference noisier than this is smoothed. Half
     #: of it takes 6 % off the error, the double adds 2 %
     detail: float = 1e-4
@@ -99,6 +104,23 @@ def outline(estimate: Estimate, spotlight: int, points: int = _POINTS) -> Array:
 def _inside(pixels: Array, scene: Scene) -> NDArray[np.bool_]:
     within = np.all((pixels > 0.0) & (pixels < scene.camera.shape[::-1]), axis=1)
     return np.asarray(within & scene.camera.shows(pixels))
+
+
+def edge_width(estimate: Estimate) -> float:
+    """Standard deviation of what spreads the image across the outlines that the frame shows, in the mean [px]."""
+    scene, squares = estimate.scene, []
+    for spotlight, axis in enumerate(spotlight_axes(estimate.pose, scene.spotlights)):
+        pixels = outline(estimate, spotlight)
+        pixels = pixels[_inside(pixels, scene)]
+        sight = look(scene, pixels)
+        spread = Spread.of(scene, sight, estimate.pose)
+        if spread.is_none or not len(pixels):
+            continue
+        to = sight.points - estimate.pose.apex
+        d = np.linalg.norm(to, axis=1)
+        rise = Rise.of(sight, axis, to / d[:, None], d, estimate.profile)
+        squares.append(spread.widths(rise).variance / (np.square(rise.gx) + np.square(rise.gy)))
+    return float(np.sqrt(np.mean(np.concatenate(squares)))) if squares else 0.0
 
 
 def outlines(estimate: Estimate, points: int = _POINTS) -> Array:
@@ -183,7 +205,8 @@ class Bins:
             if len(points) > 2:
                 corners = (points - [at.column, at.row]) / at.side - 0.5
                 cv2.fillPoly(mask, [np.round(corners).astype(np.int32)], 1)
-        reach = 2 * VIEW.reach + 1
+        blur = math.ceil(VIEW.widths * edge_width(estimate) / at.side)
+        reach = 2 * (VIEW.reach + blur) + 1
         sight = look(scene, pixels, at.side)
         ambient = ambient_irradiance(sight, scene)
         self.seen = np.isfinite(ambient)
@@ -196,100 +219,9 @@ class Bins:
             to = sight.points - estimate.pose.apex
             cosines = to @ spotlight_axes(estimate.pose, scene.spotlights).T
             self.seen &= np.argmax(cosines, axis=1) == spotlight
-        there = Sight(*(field[self.lit] for field in vars(sight).values()))
+        there = sight.part(self.lit)
         self._irradiance = Irradiance(there, pixels[self.lit], at.side, estimate, knowns, near[self.lit])
 
-    def spotlight(self, estimate: Estimate) -> Lights:
-        """The spotlights' irradiance on the lit bins."""
-        return self._irradiance(estimate)
-
-
-@dataclass(frozen=True)
-class Lights:
-    """Irradiance on bins, and its derivatives by pose and free quantities, channel by channel."""
-
-    each: tuple[tuple[Array, Array], ...]  #: `[N]` and `[P, N]`; one for all channels where they see the same
-
-    def __getitem__(self, channel: int) -> tuple[Array, Array]:
-        """A channel's irradiance `[N]` and its derivatives `[P, N]`."""
-        return self.each[min(channel, len(self.each) - 1)]
-
-
-class Irradiance:
-    """The spotlights' irradiance on bins: what falls there, and what comes back from under the retina as if it did."""
-
-    def __init__(
-        self, sight: Sight, pixels: Array, side: int, near: Estimate, knowns: Knowns, lit: NDArray[np.bool_]
-    ) -> None:
-        """`sight` is what the bins of `side` px at `pixels` `[N, 2]` see of the surface `near` an estimate.
-
-        Light falls on those that are `lit` `[N]` alone.
-        """
-        self._sight, self._pixels, self._side, self._knowns = sight, pixels, side, knowns
-        self._lit = np.flatnonzero(lit)
-        self._there = sight if lit.all() else Sight(*(field[lit] for field in vars(sight).values()))
-        deep = Deep.of(near.scene)
-        self._glow = None if deep is None else Glow(near, sight.points, side * near.scene.camera.pixel_pitch)
-
-    def __call__(self, estimate: Estimate) -> Lights:
-        """The irradiance where a fit stands."""
-        lit = self._lit
-        local = spotlight_irradiance(self._there, estimate, self._knowns, self._pixels[lit], self._side)
-        if self._glow is None:
-            return Lights((local,))
-        if len(lit) < len(self._pixels):
-            value, rows = local
-            local = np.zeros(len(self._pixels)), np.zeros((len(rows), len(self._pixels)))
-            local[0][lit], local[1][:, lit] = value, rows
-        deep = Deep.of(estimate.scene)
-        assert deep is not None
-        lights = self._glow.light(estimate, self._knowns.free)
-        each = zip(deep.shares.tolist(), lights, strict=True)
-        return Lights(tuple(self._mixed(local, light, share, estimate) for share, light in each))
-
-    def _mixed(
-        self, local: tuple[Array, Array], deep: DeepLight, share: float, estimate: Estimate
-    ) -> tuple[Array, Array]:
-        """A channel's irradiance of which a `share` is deep, and its derivatives."""
-        value, rows = local
-        by_pose = [deep.jacobian]
-        here = Light(deep.value, deep.jacobian)
-        for each in (each for each in self._knowns.free if each.changes == "sight"):
-            sides = _sides(estimate, each, self._pixels, self._side)
-            by_pose.append(light_by_surface(here, self._sight, estimate.pose, sides, each.step)[None])
-        mixed = (1.0 - share) * rows + share * np.nan_to_num(np.concatenate(by_pose))
-        # the share's odds against the local light are what is known to a factor
-        by_glow = {
-            "deep_amount": share * (1.0 - share) * (deep.value - value),
-            "deep_length": share * deep.by_length,
-        }
-        own = [by_glow[each.name][None] for each in self._knowns.free if each.changes == "glow"]
-        return (1.0 - share) * value + share * deep.value, np.concatenate([mixed, *own])
-
-
-def _sides(estimate: Estimate, quantity: Quantity, pixels: Array, side: int) -> tuple[Sight, Sight]:
-    """What bins see with a little more of a quantity, and a little less."""
-    more, less = (look(estimate.beside(quantity, step), pixels, side) for step in (quantity.step, -quantity.step))
-    return more, less
-
-
-def spotlight_irradiance(
-    sight: Sight, estimate: Estimate, knowns: Knowns, pixels: Array, side: int
-) -> tuple[Array, Array]:
-    """The irradiance that falls on bins `[N]` and its derivatives by pose, beam and what bins see `[P, N]`.
-
-    `sight` is what the bins of `side` px at `pixels` `[N, 2]` see of the nominal surface.
-    """
-    free = knowns.free
-    moving = [each for each in free if each.changes == "sight"]
-    seen = look(estimate.scene, pixels, side) if moving else sight
-    changes = estimate.beam_changes(free)
-    here = light(seen, estimate.pose, estimate.scene, estimate.profile, pose_size=estimate.pose_size, changes=changes)
-    rows = [here.jacobian]
-    for each in moving:
-        sides = _sides(estimate, each, pixels, side)
-        rows.append(light_by_surface(here, seen, estimate.pose, sides, each.step)[None])
-    jacobian = np.concatenate(rows)
-    if moving:  # and the iris before some of the bins
-        return np.nan_to_num(here.value), np.nan_to_num(jacobian)
-    return here.value, jacobian
+    def spotlight(self, estimate: Estimate, knowns: Knowns | None = None) -> Lights:
+        """The spotlights' irradiance on the lit bins, with derivatives by all that is free."""
+        return self._irradiance(estimate, knowns)

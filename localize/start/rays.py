@@ -109,7 +109,6 @@ def _across(
     inside, outside = (float(np.median(log[:, part])) for part in (core, along > START.outside))
     radius = size * overview.step * scene.camera.pixel_pitch
     profile = glowing(scene.beam, Deep.of(scene), radius)
-    kernel = _kernel(round(min(START.widest_blur, math.hypot(blur, START.sampling_blur) / size), 2))
     there, beyond = (
         float(np.interp(0.5 * (a + b), _FRACTIONS, profile))
         for a, b in ((along[0], START.inside), (START.outside, along[-1]))
@@ -123,17 +122,35 @@ def _across(
     ceiling = (1.0 + overview.floor) / (unlit * dark) if clipped else math.inf
     kept = valid[:, 1:].astype(float)
     steps = np.diff(log, axis=1) * kept
-    blurred = np.convolve(profile, kernel, "same")
-    others = [_within(at, other / overview.step - 0.5, blurred) for k, other in enumerate(curves) if k != spotlight]
-    tried = []
-    for factor in doubts:
-        bright = np.convolve(np.minimum(1.0 + factor * contrast * profile, ceiling), kernel, "same")
-        model = np.interp(along / (1.0 + START.shifts[:, None]), _FRACTIONS, bright)[None]
-        if others:
-            model = np.minimum(model + factor * contrast * np.sum(others, axis=0)[:, None], ceiling)
-        tried.append(np.abs(steps[:, None] - np.diff(np.log(model), axis=2) * kept[:, None]).sum(axis=2))
-    left = min(tried, key=lambda sums: float(sums.min(axis=1).sum()))
-    return Rays(spotlight, (middle + 0.5) * overview.step, curve[use], left, np.abs(steps).sum(axis=1))
+    elsewhere = [other / overview.step - 0.5 for k, other in enumerate(curves) if k != spotlight]
+
+    def unexplained(width: float) -> Array:
+        """What the gradients are without the light of an image blurred so far, over the outline's size `[N, S]`."""
+        kernel = _kernel(round(min(START.widest_blur, width), 2))
+        blurred = np.convolve(profile, kernel, "same")
+        others = [_within(at, other, blurred) for other in elsewhere]
+        tried = []
+        for factor in doubts:
+            bright = np.convolve(np.minimum(1.0 + factor * contrast * profile, ceiling), kernel, "same")
+            model = np.interp(along / (1.0 + START.shifts[:, None]), _FRACTIONS, bright)[None]
+            if others:
+                model = np.minimum(model + factor * contrast * np.sum(others, axis=0)[:, None], ceiling)
+            tried.append(np.abs(steps[:, None] - np.diff(np.log(model), axis=2) * kept[:, None]).sum(axis=2))
+        return min(tried, key=_least)
+
+    total = np.abs(steps).sum(axis=1)
+    sampling = math.hypot(blur, START.sampling_blur) / size
+    left = unexplained(sampling)
+    if _least(left) > START.doubted * float(total.sum()):
+        # nobody knows how sharp the image is: a wider blur must say so clearly
+        wider = min((unexplained(math.hypot(sampling, width)) for width in START.image_blurs), key=_least)
+        left = wider if _least(wider) < START.clearly * _least(left) else left
+    return Rays(spotlight, (middle + 0.5) * overview.step, curve[use], left, total)
+
+
+def _least(left: Array) -> float:
+    """What every ray leaves where it leaves least, all rays together."""
+    return float(left.min(axis=1).sum())
 
 
 def _contrast(step: float, there: float, beyond: float) -> float:

@@ -8,7 +8,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from conespot.localize.model.forward import look
+from conespot.localize.model.sight import look
 from conespot.localize.start.rays import rim
 from conespot.localize.start.rings import Ring
 from conespot.localize.start.settings import START

@@ -74,6 +74,12 @@ class StartSettings:
     least_blur: float = 0.5  # half 0, twice +3 and 1 wrong one fewer
     sampling_blur: float = 0.4  # half 0, twice -2 and 2 wrong ones more
     widest_blur: float = 0.25  # half and twice 0
+    #: blurs of the image, over a patch's size, that are tried where more than this share of the gradients is left
+    #: unexplained, and what they must leave of that: a blur of 20 um is 0.03 of a patch seen from 4 mm. On frames
+    #: without blur no start changes
+    image_blurs: tuple[float, ...] = (0.03, 0.06)
+    doubted: float = 0.3
+    clearly: float = 0.6
     #: share of white from which on a sample is clipped, and share of clipped samples that make a patch clipped
     white: float = 0.97  # half 0, twice -4
     clipped_share: float = 0.3  # half and twice 0

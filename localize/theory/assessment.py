@@ -76,7 +76,7 @@ def electrons_of(scene: Scene) -> Electrons:
 
 def tied(free: Bound, scene: Scene, pose: Pose, rcm_sigma_mm: float | None) -> Bound:
     """The bound once the RCM is known so well: its information adds to that of the image, nuisances taken out."""
-    _, prior = prior_rows(Estimate(pose, scene), scene, Knowns(rcm_sigma_mm=rcm_sigma_mm))
+    _, prior = prior_rows(Estimate(pose, scene), scene, Knowns(rcm_sigma_mm=rcm_sigma_mm).as_told)
     return Bound(np.asarray(np.linalg.inv(np.linalg.inv(free.covariance) + prior.T @ prior), float))
 
 
@@ -178,10 +178,11 @@ def _assumes(scene: Scene, sensor: Electrons) -> str:
     """What the numbers rest on, for people."""
     camera, peak, background = scene.camera, f"{sensor.peak:.0f}", f"{sensor.background:.3g}"
     return (
-        "Square pixels that average exactly, no other blur; Gaussian noise of variance signal +"
-        f" ({background} e-)^2, independent between pixels; {peak} e- where the patch is brightest; albedo uniform or"
-        " known, gain and offset unknown. The budget is of an outline fit that weighs all points alike; bumps are those"
-        f" of the paper, averaged over tips {THEORY.bump_ring:g} mm aside. Designs have the same {peak} e- each, at"
+        "Square pixels that average exactly, and the scene's own blur, of a width that is not known; Gaussian noise of"
+        f" variance signal + ({background} e-)^2, independent between pixels; {peak} e- where the patch is brightest;"
+        " albedo uniform or known, gain and offset unknown. The budget is of an outline fit that weighs all points"
+        f" alike; bumps are those of the paper, averaged over tips {THEORY.bump_ring:g} mm aside. Designs have the same"
+        f" {peak} e- each, at"
         f" {min(camera.shape[1], THEORY.design_resolution)} px; a beam other than `cycles` counts as hard there. Eye"
         f" of {scene.eye.radius:g} mm, camera {camera.height:g} mm above the pole, half angle"
         f" {math.degrees(scene.beam.half_angle):g} deg, tips at {_TIPS}."

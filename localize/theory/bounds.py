@@ -1,13 +1,13 @@
 """How good it could be: Cramer-Rao bounds, what every tolerance costs, and what a better design would gain.
 
-Pixel model, stated with every bound: square box pixels that average exactly (`localize.model.forward`), no other blur;
-Gaussian noise of variance signal + background noise^2 [e-^2], independent between pixels; the patch's peak at `peak`
-electrons; uniform albedo, or albedo known exactly; gain and offset unknown.
+Pixel model, stated with every bound: square box pixels that average exactly (`localize.model.forward`), and what else
+spreads the image of the scene, its blur's width not known unless somebody says so; Gaussian noise of variance signal +
+background noise^2 [e-^2], independent between pixels; the patch's peak at `peak` electrons; uniform albedo, or albedo
+known exactly; gain and offset unknown.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -15,14 +15,14 @@ from numpy.typing import NDArray
 
 from conespot.localize.model.deep import Deep
 from conespot.localize.model.estimate import Estimate
-from conespot.localize.model.forward import Light, Sight, light, look, window
+from conespot.localize.model.irradiance import Irradiance
 from conespot.localize.model.knowns import Knowns
 from conespot.localize.model.outline import distances
 from conespot.localize.model.prior import prior_rows
-from conespot.localize.model.profile import Profile
-from conespot.localize.model.quantity import Quantity, quantity
+from conespot.localize.model.quantity import quantity
+from conespot.localize.model.sight import look, window
 from conespot.localize.model.solve import inverse
-from conespot.localize.model.view import Irradiance
+from conespot.localize.model.view import edge_width
 from conespot.localize.theory.settings import THEORY
 from conespot.scene.pose import Pose
 from conespot.scene.scene import Scene
@@ -57,7 +57,8 @@ class Bound:
 
 
 def patch_pixels(scene: Scene, pose: Pose, margin: float = THEORY.margin_px) -> Array:
-    """Centres `[N, 2]` [px] of the frame's pixels around all patches of a pose, `margin` [px] beyond the outlines."""
+    """Centres `[N, 2]` [px] of the frame's pixels around all patches of a pose, `margin` [px] beyond their light."""
+    margin += THEORY.widths * edge_width(Estimate(pose, scene))
     points = np.concatenate(_outlines(scene, pose))
     edge = scene.camera.shape[::-1]
     points = points[np.all(np.isfinite(points), axis=1)]
@@ -83,68 +84,27 @@ def cramer_rao(
     Raises ValueError if the frame does not determine the pose (no patch in it, or nothing to hold a free quantity).
     """
     estimate, knowns = Estimate(pose, scene), knowns.within(scene)
-    deep = Deep.of(scene)
+    deep, margin = Deep.of(scene), THEORY.margin_px
     if deep is not None:
-        return _glowing(estimate, deep, sensor, knowns)
-    pixels = patch_pixels(scene, pose)
-    size = estimate.pose_size
-    here = _light(scene, pose, pixels, pose_size=size, changes=estimate.beam_changes(knowns.free))
-    peak = float(np.quantile(here.value[here.value > 0.0], THEORY.peak_quantile)) if np.any(here.value > 0.0) else 0.0
+        # light that comes back from under the retina is seen as far as it tells of that
+        margin = THEORY.glow_reach * deep.kernels[0].reach(0.5) / scene.camera.pixel_pitch
+    pixels = patch_pixels(scene, pose, margin)
+    sight = look(scene, pixels)
+    seen = np.isfinite(sight.points[:, 0])
+    light, rows = Irradiance(sight.part(seen), pixels[seen], 1, estimate, knowns, seen[seen])(estimate)[0]
+    peak = float(np.quantile(light[light > 0.0], THEORY.peak_quantile)) if np.any(light > 0.0) else 0.0
     if peak <= 0.0:
         raise ValueError("the frame shows no patch of this pose")
     gain = sensor.peak / peak
-    rows = [gain * here.jacobian[:size]]
-    rows.append(gain * here.jacobian[size:])
-    rows += [gain * _difference(estimate, pixels, each)[None] for each in knowns.free if each.changes == "sight"]
-    return _bound(estimate, gain * here.value, np.concatenate(rows), sensor, knowns)
-
-
-def _glowing(estimate: Estimate, deep: Deep, sensor: Electrons, knowns: Knowns) -> Bound:
-    """`cramer_rao` where light comes back from under the retina, which is seen as far as it tells of that."""
-    scene, channel = estimate.scene, 0
-    margin = THEORY.glow_reach * deep.kernels[channel].reach(0.5) / scene.camera.pixel_pitch
-    pixels = patch_pixels(scene, estimate.pose, margin)
-    sight = look(scene, pixels)
-    seen = np.isfinite(sight.points[:, 0])
-    sight = Sight(*(field[seen] for field in vars(sight).values()))
-    value, rows = Irradiance(sight, pixels[seen], 1, estimate, knowns, seen[seen])(estimate)[channel]
-    gain = sensor.peak / float(np.quantile(value, THEORY.peak_quantile))
-    return _bound(estimate, gain * value, gain * rows, sensor, knowns)
-
-
-def _bound(estimate: Estimate, electrons: Array, rows: Array, sensor: Electrons, knowns: Knowns) -> Bound:
-    """The bound of a frame that shows `electrons` `[N]`, with their derivatives `[P, N]` by all that is free."""
     size, count = estimate.pose_size, len(rows)
-    jacobian = np.concatenate([rows, np.stack([electrons, np.ones(electrons.size)])])
-    information = (jacobian / (electrons + sensor.background**2)) @ jacobian.T
-    _, prior = prior_rows(estimate, estimate.scene, knowns)
+    jacobian = np.concatenate([gain * rows, np.stack([gain * light, np.ones(light.size)])])
+    information = (jacobian / (gain * light + sensor.background**2)) @ jacobian.T
+    _, prior = prior_rows(estimate, scene, knowns)
     information[:count, :count] += prior.T @ prior
     covariance = inverse(information)
     if np.any(np.diag(information) == 0.0) or not np.all(np.isfinite(covariance)):
         raise ValueError("the frame does not determine every free quantity")
     return Bound(covariance[:size, :size])
-
-
-def _light(
-    scene: Scene,
-    pose: Pose,
-    pixels: Array,
-    *,
-    pose_size: int = 5,
-    changes: Sequence[tuple[Profile, Profile, float]] = (),
-) -> Light:
-    sight = look(scene, pixels)
-    seen = np.isfinite(sight.points[:, 0])
-    if not seen.all():
-        pixels = pixels[seen]
-        sight = look(scene, pixels)
-    return light(sight, pose, scene, Profile.of(scene.beam), pose_size=pose_size, changes=changes)
-
-
-def _difference(estimate: Estimate, pixels: Array, quantity: Quantity) -> Array:
-    step = THEORY.difference
-    sides = [_light(estimate.beside(quantity, s), estimate.pose, pixels).value for s in (step, -step)]
-    return (sides[0] - sides[1]) / (2.0 * step)
 
 
 @dataclass(frozen=True)
@@ -219,5 +179,5 @@ def smoothed_over(scene: Scene, pose: Pose, *, rcm: bool) -> Array:
 
 def _step(pixels: Array, spots: NDArray[np.intp], at: Estimate, *, rcm: bool) -> Array:
     r, jac, _ = distances(pixels, spots, at)
-    pr, pj = prior_rows(at, at.scene, Knowns(rcm_sigma_mm=0.0 if rcm else None))
+    pr, pj = prior_rows(at, at.scene, Knowns(rcm_sigma_mm=0.0 if rcm else None).as_told)
     return np.asarray(-np.linalg.solve(jac.T @ jac + pj.T @ pj, jac.T @ r + pj.T @ pr))

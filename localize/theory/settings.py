@@ -47,6 +47,8 @@ class TheorySettings:
     #: medians of the deep light's kernel beyond the outlines that count, where light comes back from under the retina:
     #: half raises bounds by up to 1 %, three times as many lower them by up to 1 %
     glow_reach: float = 1.0
+    #: and standard deviations of what spreads the image
+    widths: float = 4.0
     #: quantile of a patch's light that the sensor's peak stands for; the brightest pixel alone may be any. 0.998 or
     #: 0.9995 change bounds by 7e-4
     peak_quantile: float = 0.999

@@ -7,8 +7,9 @@ import math
 import numpy as np
 import pytest
 
-from conespot.localize.model.forward import moved, window
+from conespot.localize.model.forward import moved
 from conespot.localize.model.occlusion import covered
+from conespot.localize.model.sight import window
 from conespot.render import Renderer
 from conespot.scene import Camera, Scene
 from conespot.scene.illumination import Ambient

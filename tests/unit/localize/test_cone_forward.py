@@ -3,8 +3,9 @@
 import numpy as np
 import pytest
 
-from conespot.localize.model.forward import light, look, moved, window
+from conespot.localize.model.forward import light, moved
 from conespot.localize.model.profile import Profile
+from conespot.localize.model.sight import look, window
 from conespot.scene.beam import CyclesBeam, HardBeam, LinearBeam, TabulatedBeam
 from conespot.scene.camera import Camera
 from conespot.scene.pose import Pose, tangents

@@ -11,8 +11,9 @@ from conespot.localize.edge.saturated import SaturatedFit
 from conespot.localize.edge.strips import Strips, score_covariance
 from conespot.localize.image import Frame
 from conespot.localize.model.estimate import Estimate
-from conespot.localize.model.forward import ambient_irradiance, light, look, moved, window
+from conespot.localize.model.forward import ambient_irradiance, light, moved
 from conespot.localize.model.profile import Profile
+from conespot.localize.model.sight import look, window
 from conespot.localize.theory.bounds import cramer_rao
 from conespot.scene import Scene
 from conespot.scene.beam import CyclesBeam, HardBeam, LinearBeam

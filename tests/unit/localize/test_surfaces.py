@@ -7,9 +7,10 @@ import pytest
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
-from conespot.localize.model.forward import look, moved
+from conespot.localize.model.forward import moved
 from conespot.localize.model.knowns import Knowns
 from conespot.localize.model.outline import fit_outline
+from conespot.localize.model.sight import look
 from conespot.localize.theory.bounds import smoothed_over
 from conespot.scene.beam import HardBeam
 from conespot.scene.camera import Camera

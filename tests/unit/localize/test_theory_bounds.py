@@ -47,7 +47,7 @@ def test_the_bound_of_the_axis_is_the_tabulated_one(apex, axis_deg):
 def test_an_exact_rcm_tightens_the_bound_tenfold(hard, low, high):
     scene = scene_of(1000, hard)
     pose = scene.pose(np.array(HIGH))
-    free, tied = (cramer_rao(scene, pose, knowns=Knowns(rcm_sigma_mm=s)).position_mm for s in (None, 0.0))
+    free, tied = (cramer_rao(scene, pose, knowns=Knowns(s, blur_sigma_mm=0.0)).position_mm for s in (None, 0.0))
     assert low < free / tied < high
 
 

@@ -1,0 +1,111 @@
+"""The spotlights' irradiance on bins of an image, and how it changes with all that is free."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from conespot.localize.model.deep import Deep
+from conespot.localize.model.estimate import Estimate
+from conespot.localize.model.forward import Light, light, light_by_surface
+from conespot.localize.model.glow import DeepLight, Glow
+from conespot.localize.model.knowns import Knowns
+from conespot.localize.model.quantity import Quantity
+from conespot.localize.model.sight import Sight, look
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Lights:
+    """Irradiance on bins, and its derivatives by pose and free quantities, channel by channel."""
+
+    each: tuple[tuple[Array, Array], ...]  #: `[N]` and `[P, N]`; one for all channels where they see the same
+
+    def __getitem__(self, channel: int) -> tuple[Array, Array]:
+        """A channel's irradiance `[N]` and its derivatives `[P, N]`."""
+        return self.each[min(channel, len(self.each) - 1)]
+
+
+class Irradiance:
+    """The spotlights' irradiance on bins: what falls there, and what comes back from under the retina as if it did."""
+
+    def __init__(
+        self, sight: Sight, pixels: Array, side: int, near: Estimate, knowns: Knowns, lit: NDArray[np.bool_]
+    ) -> None:
+        """`sight` is what the bins of `side` px at `pixels` `[N, 2]` see of the surface `near` an estimate.
+
+        Light falls on those that are `lit` `[N]` alone.
+        """
+        self._sight, self._pixels, self._side, self._knowns = sight, pixels, side, knowns
+        self._lit = np.flatnonzero(lit)
+        self._there = sight if lit.all() else sight.part(self._lit)
+        deep = Deep.of(near.scene)
+        self._glow = None if deep is None else Glow(near, sight.points, side * near.scene.camera.pixel_pitch)
+
+    def __call__(self, estimate: Estimate, knowns: Knowns | None = None) -> Lights:
+        """The irradiance where a fit stands, with derivatives by all that its own or other `knowns` leave free."""
+        lit, free = self._lit, (knowns or self._knowns).free
+        local = spotlight_irradiance(self._there, estimate, free, self._pixels[lit], self._side)
+        if self._glow is None:
+            return Lights((local,))
+        if len(lit) < len(self._pixels):
+            value, rows = local
+            local = np.zeros(len(self._pixels)), np.zeros((len(rows), len(self._pixels)))
+            local[0][lit], local[1][:, lit] = value, rows
+        deep = Deep.of(estimate.scene)
+        assert deep is not None
+        lights = self._glow.light(estimate, free)
+        each = zip(deep.shares.tolist(), lights, strict=True)
+        return Lights(tuple(self._mixed(local, light, share, estimate, free) for share, light in each))
+
+    def _mixed(
+        self, local: tuple[Array, Array], deep: DeepLight, share: float, estimate: Estimate, free: tuple[Quantity, ...]
+    ) -> tuple[Array, Array]:
+        """A channel's irradiance of which a `share` is deep, and its derivatives."""
+        value, rows = local
+        # deep light is wider than any spread of the image: it does not change with that
+        by_pose = [deep.jacobian, np.zeros((sum(each.changes == "spread" for each in free), len(value)))]
+        here = Light(deep.value, deep.jacobian)
+        for each in (each for each in free if each.changes == "sight"):
+            sides = _sides(estimate, each, self._pixels, self._side)
+            by_pose.append(light_by_surface(here, self._sight, estimate.pose, sides, each.step)[None])
+        mixed = (1.0 - share) * rows + share * np.nan_to_num(np.concatenate(by_pose))
+        # the share's odds against the local light are what is known to a factor
+        by_glow = {
+            "deep_amount": share * (1.0 - share) * (deep.value - value),
+            "deep_length": share * deep.by_length,
+        }
+        own = [by_glow[each.name][None] for each in free if each.changes == "glow"]
+        return (1.0 - share) * value + share * deep.value, np.concatenate([mixed, *own])
+
+
+def _sides(estimate: Estimate, quantity: Quantity, pixels: Array, side: int) -> tuple[Sight, Sight]:
+    """What bins see with a little more of a quantity, and a little less."""
+    more, less = (look(estimate.beside(quantity, step), pixels, side) for step in (quantity.step, -quantity.step))
+    return more, less
+
+
+def spotlight_irradiance(
+    sight: Sight, estimate: Estimate, free: tuple[Quantity, ...], pixels: Array, side: int
+) -> tuple[Array, Array]:
+    """The irradiance that falls on bins `[N]` and its derivatives by pose, beam, spread and what bins see `[P, N]`.
+
+    `sight` is what the bins of `side` px at `pixels` `[N, 2]` see of the nominal surface.
+    """
+    moving = [each for each in free if each.changes == "sight"]
+    seen = look(estimate.scene, pixels, side) if moving else sight
+    here = light(
+        seen, estimate.pose, estimate.scene, estimate.profile,
+        pose_size=estimate.pose_size, changes=estimate.beam_changes(free), widenings=estimate.wider(free),
+    )  # fmt: skip
+    if not moving:
+        return here.value, here.jacobian
+    rows = [here.jacobian]
+    for each in moving:
+        sides = _sides(estimate, each, pixels, side)
+        rows.append(light_by_surface(here, seen, estimate.pose, sides, each.step)[None])
+    # and the iris before some of the bins
+    return np.nan_to_num(here.value), np.nan_to_num(np.concatenate(rows))
