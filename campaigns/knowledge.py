@@ -14,6 +14,7 @@ import numpy as np
 from pydantic import BeforeValidator, Field, PlainSerializer, model_validator
 
 from conespot.localize.model.knowns import RCM_SIGMA_MM, Knowns
+from conespot.localize.model.quantity import quantity
 from conespot.scene import Scene
 from conespot.scene.model import Model, Words
 from conespot.scene.quantity import Angle, Length, format_quantity
@@ -45,9 +46,10 @@ class Knowledge(Model):
     """Errors (standard deviations of what is told) and sigmas (what a localizer may assume); `free` is not known.
 
     `rcm` is in mm along each axis, the others are in their own unit. `surface` is what the localizers are told in
-    place of the true one. Without `spread_told` they are told that no light spreads under the retina; `spread_error` is
-    of the logarithms of its amount and of how far it goes. `reference` is how many frames without spotlights they are
-    given, averaged; `sequence` from how many of the trajectory's own frames, evenly spread, they learn the same view.
+    place of the true one, and so is `blur`, the width of what the camera's lens does not resolve (0 mm: it resolves
+    all). Without `spread_told` they are told that no light spreads under the retina; `spread_error` is of the
+    logarithms of its amount and of how far it goes. `reference` is how many frames without spotlights they are given,
+    averaged; `sequence` from how many of the trajectory's own frames, evenly spread, they learn the same view.
     """
 
     rcm_error: Length = Field(0.0, ge=0.0)
@@ -60,6 +62,7 @@ class Knowledge(Model):
     camera_height_sigma: LengthSigma = 0.0
     semi_axes_sigma: LengthSigma = 0.0
     relief_sigma: Length = Field(0.0, ge=0.0)
+    blur: Length | None = Field(None, ge=0.0, le=0.2)
     surface: AnySurface | None = None
     spread_told: bool = True
     spread_error: float = Field(0.0, ge=0.0, le=2.0)
@@ -112,7 +115,8 @@ class Knowledge(Model):
             update["surface"] = self.surface
         if isinstance(scene.retina, Fundus) and scene.retina.spread is not None:
             update["retina"] = scene.retina.model_copy(update={"spread": self._spread(scene.retina.spread, rng)})
-        return scene.model_copy(update=update)
+        told_scene = scene.model_copy(update=update)
+        return told_scene if self.blur is None else quantity("blur").write(told_scene, self.blur**2)
 
     def _spread(self, true: Spread, rng: np.random.Generator) -> Spread | None:
         """What is told of light under the retina."""

@@ -44,6 +44,6 @@ def edge_outcome(
     if isinstance(fit, LocalizationFailure):
         return fit
     return judged(
-        fit.estimate, fit.covariance, start.scene, knowns,
+        fit.estimate, fit.covariance, start.scene, fit.knowns,
         misfit=fit.misfit, covered=fit.covered, settled=fit.settled,
     )  # fmt: skip

@@ -42,7 +42,7 @@ def photometric(
         if isinstance(fit, LocalizationFailure):
             return fit
         return judged(
-            fit.estimate, inverse(fit.information), scene, known,
+            fit.estimate, inverse(fit.information), scene, fit.knowns,
             misfit=fit.misfit, covered=fit.lit_share, settled=fit.settled,
         )  # fmt: skip
 

@@ -144,8 +144,8 @@ def fit_band(
         # the channels stay as they are
         seen, prior = [copy(channel) for channel in channels], prior_rows(estimate, nominal, free)
         own, pull, _ = _equations(seen, irradiance, shed(estimate, free), prior)
-        doubt = contradicted(own, pull, estimate, free)
-    return BandFit(estimate, information, pj, step, band.covered, tuple(channels), doubt)
+        doubt = contradicted(own, pull, estimate, free, knowns)
+    return BandFit(estimate, information, pj, step, band.covered, knowns, tuple(channels), doubt)
 
 
 def _equations(

@@ -54,17 +54,17 @@ def fit_edge(
     size = float(np.max(np.ptp(points, axis=0))) / (1.0 if len(start.scene.spotlights) == 1 else 2.0)
     sharp, clipped = is_sharp(start.scene), _clipped_share(frame, start)
     if sharp and clipped > EDGE.throughout:
-        return _throughout(frame, start, knowns.as_told, size)
+        return _throughout(frame, start, knowns, size)
     full = sharp or clipped > EDGE.clipped
     fit: BandFit | None = None
-    used = knowns.as_told
+    used = knowns
     levels = _levels(EDGE.rim if full else EDGE.soft, size)
     for number, level in enumerate(levels):
         last = number + 1 == len(levels)
         while True:
             found = fit_band(
                 frame, start, fit, used, noise, reference, stage=_stage(level, size, edge_width(start), last=last),
-                tied=number == 0, doubted=knowns if used != knowns else None,
+                tied=number == 0 and len(levels) > 1, doubted=knowns.doubting if used == knowns else None,
             )  # fmt: skip
             if isinstance(found, LocalizationFailure):
                 # what starts inside the frame and leaves it has run off
@@ -72,7 +72,7 @@ def fit_edge(
             fit, start = found, found.estimate
             if not found.contradicted:
                 break
-            used = knowns
+            used = knowns.doubting
     assert fit is not None
     return fit
 

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from conespot.localize.model.estimate import Estimate
+from conespot.localize.model.knowns import Knowns
 from conespot.localize.model.solve import STEP, inverse
 
 Array = NDArray[np.float64]
@@ -25,6 +26,7 @@ class EdgeFit(ABC):
     prior: Array  #: the priors' whitened rows `[Q, P]`
     step: Array  #: the last `[P]`
     covered: float  #: share of the outlines that was looked at
+    knowns: Knowns  #: by which it was fitted
 
     @property
     @abstractmethod

@@ -100,7 +100,7 @@ def fit_saturated(
         step = limited(found, EDGE.saturated_step_mm)
         contrast += float(np.clip((slope[size] - whole[size, :size] @ step) / whole[size, size], -1.0, 1.0))
         estimate = estimate.moved(step, knowns.free)
-    return SaturatedFit(estimate, information, pj, step, ribbon.covered, strips, rows, residual, uncertain)
+    return SaturatedFit(estimate, information, pj, step, ribbon.covered, knowns, strips, rows, residual, uncertain)
 
 
 def _contrast_prior(size: int, sigma: float) -> Array:

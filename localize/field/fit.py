@@ -41,6 +41,7 @@ class FieldFit:
     misfit: float  #: rms of the lit bins' residuals, outliers cut, over what the model expects
     settled: bool  #: whether the last step was small
     lit_share: float  #: share of the predicted patches that the frame shows and that is not clipped
+    knowns: Knowns  #: by which it was fitted
     contradicted: bool  #: whether the windows show what was taken as told to be otherwise
 
 
@@ -49,10 +50,10 @@ def fit_patch(
 ) -> FieldFit | LocalizationFailure:
     """The fit, coarse to fine, or why there is none."""
     fit: FieldFit | None = None
-    used = knowns.as_told
+    used = knowns
     for level in FIELD.levels:
         while True:
-            doubted = knowns if used != knowns else None
+            doubted = knowns.doubting if used == knowns else None
             found = fit_field(frame, start, fit, used, noise, reference, level, doubted)
             if isinstance(found, LocalizationFailure):
                 # what starts inside the frame and leaves it has run off
@@ -60,7 +61,7 @@ def fit_patch(
             fit, start = found, found.estimate
             if not found.contradicted:
                 break
-            used = knowns
+            used = knowns.doubting
     assert fit is not None
     return fit
 
@@ -117,7 +118,7 @@ def fit_field(
     if doubted is not None:
         seen = [piece.bins.spotlight(estimate, doubted)[lead] for piece in pieces]
         # the pieces stay as they are
-        doubt = _contradicted([copy(piece) for piece in pieces], seen, gain, estimate, nominal, doubted)
+        doubt = _contradicted([copy(piece) for piece in pieces], seen, gain, estimate, nominal, (doubted, knowns))
     own = information[size, :size]
     data = information[:size, :size] - np.outer(own, own) / max(information[size, size], 1e-12) - prior
     return FieldFit(
@@ -129,6 +130,7 @@ def fit_field(
         float(np.sqrt(np.mean([piece.misfit**2 for piece in pieces]))),
         settled,
         visible(estimate) * float(np.mean([piece.unclipped() for piece in pieces])),
+        knowns,
         doubt,
     )
 
@@ -139,9 +141,10 @@ def _contradicted(
     gain: float,
     estimate: Estimate,
     nominal: Scene,
-    knowns: Knowns,
+    doubt: tuple[Knowns, Knowns],
 ) -> bool:
-    """Whether the windows show that to be otherwise which is taken as told, and which `knowns` leave free."""
+    """Whether the windows show that to be otherwise which the first of `doubt` leaves free, and the second does not."""
+    knowns, told = doubt
     residuals, rows = prior_rows(estimate, nominal, knowns)
     equations = _equations(pieces, lights, gain, rows.T @ rows, -rows.T @ residuals)
     if equations is None:
@@ -155,6 +158,7 @@ def _contradicted(
         gradient[:size] - own * gradient[size],
         estimate,
         knowns,
+        told,
     )
 
 

@@ -30,16 +30,16 @@ class DoubtSettings:
 DOUBT = DoubtSettings()
 
 
-def contradicted(information: Array, gradient: Array, at: Estimate, knowns: Knowns) -> bool:
-    """Whether one step from what is told would change what may be doubted by more than chance does.
+def contradicted(information: Array, gradient: Array, at: Estimate, doubted: Knowns, knowns: Knowns) -> bool:
+    """Whether one step would change by more than chance does what is free in `doubted` and not in `knowns`.
 
-    `information` `[P, P]` and `gradient` `[P]` are those of the pose and all that `knowns` leaves free.
+    `information` `[P, P]` and `gradient` `[P]` are those of the pose and all that is free in `doubted`.
     """
     covariance = inverse(information)
     step = covariance @ gradient
     size = at.pose_size
-    for j, each in enumerate(knowns.free, start=size):
-        if each in knowns.as_told.free or not step[j] ** 2 > DOUBT.sigmas**2 * covariance[j, j]:
+    for j, each in enumerate(doubted.free, start=size):
+        if each in knowns.free or not step[j] ** 2 > DOUBT.sigmas**2 * covariance[j, j]:
             continue
         # what cannot be less, as a blur where there is none, is not contradicted by less
         here = each.value(at.scene)

@@ -32,8 +32,8 @@ class Knowns:
     half_angle_sigma_deg: float | None = 0.0
     softness_sigma: float | None = 0.0  #: of a `cycles` beam's blend
     #: of the lens' residual blur, with what else spreads the image alike: the square of its width may be off by the
-    #: square of this. A frame that does not contradict what is told of it is fitted with that
-    blur_sigma_mm: float | None = None
+    #: square of this. Doubted, it is as the scene says until a frame contradicts that, and then free
+    blur_sigma_mm: float | Literal["doubted"] | None = "doubted"
     eye_radius_sigma_mm: float | None = 0.0
     camera_height_sigma_mm: float | None = 0.0
     #: of each of the retina's semi-axes: `scene.population.SEMI_AXES_SIGMA_MM` about the mean eye for an unknown one
@@ -48,7 +48,7 @@ class Knowns:
 
     def __post_init__(self) -> None:
         for name, value in vars(self).items():
-            if value is None or (value == "usual" and name in _USUAL):
+            if value is None or (value == "usual" and name in _USUAL) or (value, name) == ("doubted", "blur_sigma_mm"):
                 continue
             if isinstance(value, str) or not (math.isfinite(value) and value >= 0.0):
                 raise InputError(f"knowns: {name} must be 0 (exact), positive, or None (free), got {value!r}")
@@ -64,12 +64,12 @@ class Knowns:
         return tuple(each for each in QUANTITIES if self.sigma(each) != 0.0)
 
     @property
-    def as_told(self) -> Knowns:
-        """The same with a blur that is free taken as it is told, until a frame contradicts that."""
-        return replace(self, blur_sigma_mm=0.0) if self.blur_sigma_mm is None else self
+    def doubting(self) -> Knowns:
+        """The same with what is doubted free."""
+        return replace(self, blur_sigma_mm=None) if self.blur_sigma_mm == "doubted" else self
 
     def sigma(self, quantity: Quantity) -> float | None:
-        """Sigma of a quantity in the unit held inside; None if it is free, 0 if it is usual and nobody says where."""
+        """Sigma of a quantity in the unit held inside; None if it is free, 0 if it is doubted or usual."""
         own: float | str | None = getattr(self, quantity.known)
         if own is None:
             return None

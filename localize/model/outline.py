@@ -89,14 +89,13 @@ def fit_outline(
     None if there are fewer points than parameters or the fit is singular.
     """
     points = np.asarray(pixels, float)
-    knowns = knowns.as_told  # an outline shows no blur
     which = np.zeros(len(points), np.intp) if spots is None else spots
     pose = start if start is not None else start_pose(points, which, scene)
     if pose is None or len(points) < 6:
         return None
     first = Estimate(pose, scene)
     if start is None:
-        exact = Knowns(rcm_sigma_mm=1e-3).as_told
+        exact = Knowns(rcm_sigma_mm=1e-3)
         tied = minimize(outline_problem(points, which, 1.0, scene, exact), first, (), robust=robust)
         if tied is None:
             return None

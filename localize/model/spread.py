@@ -30,16 +30,16 @@ _STEP = 0.01  # of the tip [mm], for second differences
 
 
 def way_covariance(scene: Scene) -> Array:
-    """Covariance `[3, 3]` [mm^2] of the tip's places during the exposure; of a tremor what it is in the mean."""
+    """Covariance `[3, 3]` [mm^2] of the tip's places during the exposure, as far as the scene tells.
+
+    Of a tremor it does not tell where the hand goes in this frame: that is sought as a blur.
+    """
     match scene.motion:
-        case None:
+        case None | Tremor():
             return np.zeros((3, 3))
         case Velocity():
             way = exposure_of(scene.motion, scene.sensor) * np.asarray(scene.motion.velocity)
             return np.outer(way, way) / 12.0
-        case Tremor():
-            speed = 2.0 * np.pi * scene.motion.frequency * scene.motion.rms
-            return np.eye(3) * (speed * exposure_of(scene.motion, scene.sensor)) ** 2 / 36.0
         case unknown:
             assert_never(unknown)
 

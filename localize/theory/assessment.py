@@ -76,7 +76,7 @@ def electrons_of(scene: Scene) -> Electrons:
 
 def tied(free: Bound, scene: Scene, pose: Pose, rcm_sigma_mm: float | None) -> Bound:
     """The bound once the RCM is known so well: its information adds to that of the image, nuisances taken out."""
-    _, prior = prior_rows(Estimate(pose, scene), scene, Knowns(rcm_sigma_mm=rcm_sigma_mm).as_told)
+    _, prior = prior_rows(Estimate(pose, scene), scene, Knowns(rcm_sigma_mm=rcm_sigma_mm))
     return Bound(np.asarray(np.linalg.inv(np.linalg.inv(free.covariance) + prior.T @ prior), float))
 
 

@@ -83,7 +83,7 @@ def cramer_rao(
 
     Raises ValueError if the frame does not determine the pose (no patch in it, or nothing to hold a free quantity).
     """
-    estimate, knowns = Estimate(pose, scene), knowns.within(scene)
+    estimate, knowns = Estimate(pose, scene), knowns.within(scene).doubting
     deep, margin = Deep.of(scene), THEORY.margin_px
     if deep is not None:
         # light that comes back from under the retina is seen as far as it tells of that
@@ -179,5 +179,5 @@ def smoothed_over(scene: Scene, pose: Pose, *, rcm: bool) -> Array:
 
 def _step(pixels: Array, spots: NDArray[np.intp], at: Estimate, *, rcm: bool) -> Array:
     r, jac, _ = distances(pixels, spots, at)
-    pr, pj = prior_rows(at, at.scene, Knowns(rcm_sigma_mm=0.0 if rcm else None).as_told)
+    pr, pj = prior_rows(at, at.scene, Knowns(rcm_sigma_mm=0.0 if rcm else None))
     return np.asarray(-np.linalg.solve(jac.T @ jac + pj.T @ pj, jac.T @ r + pj.T @ pr))
