@@ -57,14 +57,15 @@ def fit_edge(
         return _throughout(frame, start, knowns, size)
     full = sharp or clipped > EDGE.clipped
     fit: BandFit | None = None
-    used = knowns
+    # of a clipped patch the foot alone is seen, and that tells a blur from the beam's own slope no more
+    used, doubting = knowns, knowns if clipped > EDGE.clipped else knowns.doubting
     levels = _levels(EDGE.rim if full else EDGE.soft, size)
     for number, level in enumerate(levels):
         last = number + 1 == len(levels)
         while True:
             found = fit_band(
                 frame, start, fit, used, noise, reference, stage=_stage(level, size, edge_width(start), last=last),
-                tied=number == 0 and len(levels) > 1, doubted=knowns.doubting if used == knowns else None,
+                tied=number == 0 and len(levels) > 1, doubted=doubting if used != doubting else None,
             )  # fmt: skip
             if isinstance(found, LocalizationFailure):
                 # what starts inside the frame and leaves it has run off
@@ -72,7 +73,7 @@ def fit_edge(
             fit, start = found, found.estimate
             if not found.contradicted:
                 break
-            used = knowns.doubting
+            used = doubting
     assert fit is not None
     return fit
 
