@@ -11,6 +11,8 @@ from typing import TextIO
 
 #: finished units the pace is taken from: enough to be steady, few enough to follow a change of scene
 _WINDOW = 40
+#: of the bar on a terminal: its width, and how much of a place is filled
+_WIDE, _EIGHTHS = 24, "\u258f\u258e\u258d\u258c\u258b\u258a\u2589\u2588"
 _FIRST_WAIT, _LONGEST_WAIT = 5.0, 60.0
 
 
@@ -38,7 +40,7 @@ class Progress:
         self._work -= work
         self._pace.append((now, work))
         if self._tty:
-            self._rewrite(self.line())
+            self._rewrite(f"{self._bar()} {self.line()}{self._speed()}")
         elif now - self._said >= self._wait:
             self._said, self._wait = now, min(2.0 * self._wait, _LONGEST_WAIT)
             self._plain(self.line())
@@ -65,6 +67,22 @@ class Progress:
         if self.remaining() is None:
             return None
         return (len(self._pace) - 1) / (self._pace[-1][0] - self._pace[0][0])
+
+    def _bar(self) -> str:
+        """How far it is, as wide as a glance; in eighths where the terminal has them."""
+        share = min(self._done / self._frames, 1.0) if self._frames else 1.0
+        encoding = getattr(self._stream, "encoding", None) or "ascii"
+        try:
+            _EIGHTHS.encode(encoding)
+        except (UnicodeEncodeError, LookupError):
+            return f"[{'#' * round(_WIDE * share):{_WIDE}}]"
+        whole, rest = divmod(round(8 * _WIDE * share), 8)
+        return f"{(_EIGHTHS[-1] * whole + _EIGHTHS[:rest][-1:]).ljust(_WIDE)}|"
+
+    def _speed(self) -> str:
+        """Frames a second since the beginning."""
+        took = self._clock() - self._start
+        return f", {self._done / took:.3g} frames/s" if took > 1.0 else ""
 
     def note(self, sentence: str) -> None:
         """Say something that must not be lost among the progress."""

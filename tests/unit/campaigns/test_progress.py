@@ -84,3 +84,26 @@ def test_failed_localizations_are_counted():
     progress = Progress(10, 10.0, io.StringIO(), Clock())
     progress.update(2, 1.0, 3)
     assert progress.line() == "2 of 10 frames (20%), 3 not localized, 0:00"
+
+
+class Wide(io.TextIOWrapper):
+    """A terminal of an encoding."""
+
+    def __init__(self, encoding):
+        super().__init__(io.BytesIO(), encoding=encoding)
+
+    def isatty(self):
+        return True
+
+
+def test_the_bar_fills_from_empty_to_full_in_what_the_terminal_can_show():
+    for encoding, full, half in (("utf-8", "\u2588" * 24 + "|", "\u2588" * 12), ("ascii", f"[{'#' * 24}]", "#" * 12)):
+        stream = Wide(encoding)
+        run(stream, units=10)
+        stream.flush()
+        lines = stream.buffer.getvalue().decode(encoding).split("\r")
+        assert lines[5].startswith(("[", "\u2588"))
+        assert half in lines[5]
+        assert full not in lines[5]
+        assert full in lines[10]
+        assert "2 frames/s" in lines[10]
