@@ -15,9 +15,11 @@ Array = NDArray[np.float64]
 #: the search for the nearest point begins with directions this far apart on the wall [mm]: bumps are wider
 _APART_MM = 0.1
 _FEWEST, _MOST = 15, 61  # of them along a side
-_SIDE = 9  # when it is narrowed
-#: what is left of the directions' spread when the nearest distance is found to well below a nanometre [rad]
-_NARROW = 1e-7
+_SIDE, _NARROWED = 9, 3  # when it is narrowed, and how often
+#: Newton steps then, and the least step of its differences [rad]: less would be lost in rounding
+_STEPS, _NARROW = 8, 1e-5
+#: a Newton step [rad] after which the distance is found to well below a nanometre
+_SETTLED = 1e-7
 
 
 @dataclass(frozen=True)
@@ -88,14 +90,42 @@ def _nearest(scene: Scene, apex: Array) -> Array:
     # what is nearer than the wall in this direction lies within the ball that touches it
     reach = abs(float(scene.depth(apex)))
     width = math.asin(reach / out) if reach < out else math.pi
+    if scene.surface.semi_axes == (1.0, 1.0, 1.0) and out > 0.0:
+        # or is raised towards it by no more than the relief: on the sphere itself this direction's point is the nearest
+        radius = scene.eye.radius
+        share = ((reach + scene.surface.relief) ** 2 - (radius - out) ** 2) / (4.0 * radius * out)
+        width = min(width, 2.0 * math.asin(math.sqrt(min(max(share, _NARROW**2), 1.0))))
     side = int(np.clip(2 * math.ceil(width * scene.eye.radius / _APART_MM) + 1, _FEWEST, _MOST))
-    while True:
+    for _ in range(_NARROWED):
         rays = _around(middle, width, side)
-        points = scene.surface.points(scene.eye, rays)
-        best = int(np.argmin(np.sum(np.square(points - apex), axis=-1)))
-        if width < _NARROW:
-            return np.asarray(points[best])
+        best = int(np.argmin(_squared(scene, apex, rays)))
         middle, width, side = rays[best], 3.0 * width / (side - 1), _SIDE
+    return _settled(scene, apex, middle, width / _SIDE)
+
+
+def _squared(scene: Scene, apex: Array, rays: Array) -> Array:
+    """Squared distances `[N]` [mm^2] of the wall in unit directions `[N, 3]`."""
+    return np.asarray(np.sum(np.square(scene.surface.points(scene.eye, rays) - apex), axis=-1))
+
+
+def _settled(scene: Scene, apex: Array, middle: Array, step: float) -> Array:
+    """The nearest point `[3]` [mm], by Newton's method from a direction near it, on differences over a `step` [rad]."""
+    for _ in range(_STEPS):
+        f = _squared(scene, apex, _around(middle, step, 3)).reshape(3, 3)  # rows are steps along V, columns along U
+        slope = np.array([f[1, 2] - f[1, 0], f[2, 1] - f[0, 1]]) / 2.0
+        xx, yy = f[1, 2] - 2.0 * f[1, 1] + f[1, 0], f[2, 1] - 2.0 * f[1, 1] + f[0, 1]
+        xy = (f[2, 2] - f[2, 0] - f[0, 2] + f[0, 0]) / 4.0
+        bend = xx * yy - xy * xy
+        if not (xx > 0.0 and bend > 0.0):
+            break
+        x, y = np.clip(np.array([yy * slope[0] - xy * slope[1], xx * slope[1] - xy * slope[0]]) / -bend, -2.0, 2.0)
+        u, v = tangents(middle)
+        turned = middle + step * (x * u + y * v)
+        middle = turned / np.linalg.norm(turned)
+        if step * math.hypot(x, y) < _SETTLED:
+            break
+        step = max(step * max(min(1.0, math.hypot(x, y)), 0.1), _NARROW)
+    return np.asarray(scene.surface.points(scene.eye, middle))
 
 
 def _around(middle: Array, width: float, side: int) -> Array:
