@@ -134,17 +134,18 @@ def calibrated(folder, own, scene, *options, rays):
 
 
 def test_what_a_sequence_does_not_show_stays_as_it_was_and_is_said_with_what_would_show_it(own, tmp_path, capsys):
-    """One spotlight at 300 px, and an RCM told 0.05 mm off: nothing of it can be known."""
+    """One spotlight at 300 px, and an RCM told 0.05 mm off: neither half angle, height nor how high the RCM is."""
     off = ["--set", "scene.instrument.rcm=[6.05 mm, 0 mm, 22 mm]"]
     found, text = calibrated(tmp_path, own, scene_of(HardBeam(), resolution=300), *off, rays=4)
     said = capsys.readouterr().out
-    for name in ("half_angle", "camera_height", "rcm_x"):
+    for name in ("half_angle", "camera_height", "rcm_z"):
         assert f"{name}: not observable" in said
     assert "what would show it: an object of known size" in said
-    assert found.instrument.rcm == pytest.approx((6.05, 0.0, 22.0))
+    assert found.instrument.rcm[2] == 22.0
+    assert found.beam.half_angle == pytest.approx(math.radians(9.0))
     assert found.camera == load_scene(own / "my.yaml").camera.with_columns(300)
     assert "rcm_sigma: 0.02 mm" in text  # as well as it was known before
-    assert "\n#   rcm_x: not observable" in text
+    assert "\n#   rcm_z: not observable" in text
     assert max(map(len, text.splitlines())) <= 120
     assert main(["localize", str(tmp_path / "0.png"), "--scene", str(tmp_path / "calibrated.yaml")]) == 0
 
