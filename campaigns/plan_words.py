@@ -31,11 +31,14 @@ PACE = Pace()
 
 @dataclass(frozen=True)
 class Size:
-    """What a run takes [bytes], as its processes and folder were measured, at 500 to 5000 px (docs/performance.md)."""
+    """What a run takes [bytes], as its processes and folder were measured, see docs/performance.md, Memory."""
 
     session: float = 0.4e9  #: the command itself, with the figures
     worker: float = 0.7e9  #: a process that renders a grey retina
     spectral_worker: float = 1.2e9  #: one that renders a living fundus
+    pixel: float = (
+        9.0  #: of a frame, in each process that renders, beside 0.25 GB: more than that from 7000 px a side on
+    )
     row: float = 1.2e3  #: in journal, CSV and parquet together
     report: float = 5e6
 
@@ -65,7 +68,9 @@ def describe(plan: Plan, workers: int) -> Iterator[str]:
 def _memory(plan: Plan, workers: int) -> float:
     """Memory [bytes] of the processes of a run."""
     spectral = any(case.scene.retina.is_spectral for case in plan.cases)
-    return SIZE.session + workers * (SIZE.spectral_worker if spectral else SIZE.worker)
+    most = max(math.prod(case.scene.camera.shape) for case in plan.cases)
+    worker = max(SIZE.spectral_worker if spectral else SIZE.worker, 0.25e9 + SIZE.pixel * most)
+    return SIZE.session + workers * worker
 
 
 def _disk(plan: Plan) -> float:

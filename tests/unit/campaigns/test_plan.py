@@ -181,6 +181,8 @@ def test_memory_grows_with_workers_and_disk_with_frames_that_are_kept(plan):
     few, kept = (list(describe(plan(text.format(frames)), n))[-1] for frames, n in (("false", 1), ("true", 3)))
     assert few == "about 1.1 GB of memory, and 5 MB of disk"
     assert kept == "about 2.5 GB of memory, and 45 MB of disk"
+    large = "scene: {preset: paper, camera: {resolution: 10000}}\nposes: 1\n"
+    assert list(describe(plan(large), 2))[-1].startswith("about 2.7 GB of memory")
 
 
 def test_edge_samples_are_rendered_apart_and_are_counted_as_work_where_the_beam_is_hard(plan):
