@@ -81,6 +81,7 @@ class Table:
     wavelengths: Array  #: `[W]` [nm]
     scattering: Array  #: factors on the coefficients `[S]`
     radii: Array  #: `[K]` [mm]
+    reflectance: Array  #: of choroid and sclera alone `[S, W]`
     enclosed: Array  #: share within each radius `[S, W, K]`
 
 
@@ -91,12 +92,14 @@ def spread_table(pigmentation: Pigmentation) -> Table:
     rows = list(csv.DictReader(line for line in text.splitlines() if not line.startswith("#")))
     own = [row for row in rows if row["pigmentation"] == pigmentation]
     names = [name for name in rows[0] if name.replace(".", "").isdigit()]
-    shares = {
-        (float(row["scattering"]), float(row["wavelength_nm"])): [float(row[name]) for name in names] for row in own
+    found = {
+        (float(row["scattering"]), float(row["wavelength_nm"])): [float(row[n]) for n in ("reflectance", *names)]
+        for row in own
     }
-    factors, wavelengths = (sorted({key[i] for key in shares}) for i in (0, 1))
-    enclosed = np.array([[shares[factor, wavelength] for wavelength in wavelengths] for factor in factors])
-    return Table(np.array(wavelengths), np.array(factors), 1e-3 * np.array([float(name) for name in names]), enclosed)
+    factors, wavelengths = (sorted({key[i] for key in found}) for i in (0, 1))
+    values = np.array([[found[factor, wavelength] for wavelength in wavelengths] for factor in factors])
+    radii = 1e-3 * np.array([float(name) for name in names])
+    return Table(np.array(wavelengths), np.array(factors), radii, values[..., 0], values[..., 1:])
 
 
 @functools.cache
