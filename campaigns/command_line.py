@@ -9,7 +9,7 @@ from pathlib import Path
 from conespot.campaigns import authoring, new_microscope, other_methods, subcommands
 from conespot.campaigns.ending import Ending
 from conespot.campaigns.examples import epilog
-from conespot.campaigns.machines import add_machines, add_workers
+from conespot.campaigns.machines import add_machines, add_workers, few
 from conespot.campaigns.new_campaign import QUESTIONS
 from conespot.campaigns.questions import add_questions
 from conespot.campaigns.settings import add_set, add_settings
@@ -81,6 +81,8 @@ def _add_campaigns(add: _Add) -> None:
     theory.add_argument("--out", metavar="FOLDER", help="where to write (default: runs/theory-SCENE)")
     for command in (run, plan):
         add_machines(command)
+    crops = "keep pictures of the N worst frames of each box (default: 1 of a run of 300 rows or more, 0 for none)"
+    run.add_argument("--crops", metavar="N", type=few, help=crops)
     run.add_argument("--log", metavar="FILE", type=Path, help="append what happens to a file, a JSON object a line")
     listed = add(authoring.list, "list the shipped campaigns")
     listed.add_argument("--localizers", action="store_true", help="list the localizers in their place")
@@ -119,6 +121,8 @@ def _add_runs(add: _Add) -> None:
     retry.add_argument("--log", metavar="FILE", type=Path, help="as for run")
     report = add(subcommands.report, "make the tables, figures and report of a run folder again")
     report.add_argument("folder", type=Path, metavar="RUN")
+    report.add_argument("--crops", metavar="N", type=few, default=0, help="render N worst frames of each box again")
+    add_workers(report)
 
 
 def _add_own(add: _Add) -> None:

@@ -40,20 +40,25 @@ class Easel:
         )
 
     def _draw(self, unit: Unit, case: Case, image: AnyImage, localizer: str, outcome: Outcome) -> None:
-        scene, pose = case.scene, self._plan.groups[unit.group].pose(unit.pose)
-        saw = account(image, told(unit, case), localizer, outcome)
-        true = [scene.camera.project(scene.outline(pose, k)) for k in range(len(scene.spotlights))]
-        lines = {
-            "true": [points[np.all(np.isfinite(points), axis=1)] for points in true],
-            "found": saw.found,
-            "fitted": saw.fitted,
-        }
-        residuals = [Residual(p.row, p.column, p.side, p.light - p.predicted) for p in saw.patches]
-        white = 1.0 if image.dtype.kind == "f" else float(white_level(image, scene.sensor))
         said = outcome.reason if isinstance(outcome, LocalizationFailure) else "localized"
         draw_overlay(
-            Overlay(image, white, lines, saw.mask, residuals),
+            overlay_of(self._plan, unit, case, image, localizer, outcome),
             f"{localizer}, pose {unit.pose}: {said}",
-            f"Case {case.key}. {self._plan.says(unit)}, {scene.power.value:g} W. Residual: over an even retina.",
+            f"Case {case.key}. {self._plan.says(unit)}, {case.scene.power.value:g} W. Residual: over an even retina.",
             self._folder / f"{re.sub(r'[^A-Za-z0-9.+_-]', '-', localizer)}.png",
         )
+
+
+def overlay_of(plan: Plan, unit: Unit, case: Case, image: AnyImage, localizer: str, outcome: Outcome) -> Overlay:
+    """What is drawn over a case's frame `[H, W]` or `[H, W, 3]`: what a localizer saw in it, and the truth."""
+    scene, pose = case.scene, plan.groups[unit.group].pose(unit.pose)
+    saw = account(image, told(unit, case), localizer, outcome)
+    true = [scene.camera.project(scene.outline(pose, k)) for k in range(len(scene.spotlights))]
+    lines = {
+        "true": [points[np.all(np.isfinite(points), axis=1)] for points in true],
+        "found": saw.found,
+        "fitted": saw.fitted,
+    }
+    residuals = [Residual(p.row, p.column, p.side, p.light - p.predicted) for p in saw.patches]
+    white = 1.0 if image.dtype.kind == "f" else float(white_level(image, scene.sensor))
+    return Overlay(image, white, lines, saw.mask, residuals)

@@ -27,6 +27,13 @@ def add_workers(command: argparse._ActionsContainer) -> None:
     command.add_argument("--workers", metavar="N", type=_workers, default=_cores(), help="processes (default: cores)")
 
 
+def few(text: str) -> int:
+    """A whole number from 0 to 100, as the command line has it."""
+    if not (text.isdecimal() and int(text) <= 100):
+        raise argparse.ArgumentTypeError("must be a whole number from 0 to 100")
+    return int(text)
+
+
 def profile_of(options: argparse.Namespace) -> Profile | None:
     """The machines of the command line; None for the processes of this one. Raises InputError."""
     if not (options.profile or options.scheduler):

@@ -85,12 +85,13 @@ def carry_out(
     shard: Shard | None = None,
     choose: Choose = what_is_left,
     log: Log | None = None,
+    crops: int | None = 0,
 ) -> Session:
     """Do what is left of a campaign and write what its folder holds: rows, theory, tables, figures, report.
 
     Of a `shard` its poses alone, by default into a folder that is named after it. `choose` says which poses are left,
-    `log` is told of each. Raises as `run_campaign` does, but for poses that were lost and for interruptions while poses
-    are measured.
+    `log` is told of each. `crops` are pictures of so many worst frames of each box (campaigns.cropping). Raises as
+    `run_campaign` does, but for poses that were lost and for interruptions while poses are measured.
     """
     plan = make_plan(document)
     units = shard.units(plan) if shard and plan.cases else list(plan.units())
@@ -106,22 +107,31 @@ def carry_out(
         if plan.campaign.theory:
             _write_theory(folder)
         lost = tuple(entry.error for entry in store.entries.values() if entry.error)
-    finish(folder)
+    workers = executor.workers if isinstance(executor, LocalPool) else 1
+    finish(folder, crops if plan.cases and not lost else 0, workers)
     return Session(folder, lost)
 
 
-def finish(folder: Path) -> None:
-    """Write tables, figures and report of the rows that a run folder holds. Raises InputError."""
+def finish(folder: Path, crops: int | None = 0, workers: int = 1) -> None:
+    """Write crops, tables, figures and report of the rows that a run folder holds. Raises InputError."""
     from conespot.results import write_results
 
     with alone(folder):
+        if crops != 0:
+            from conespot.campaigns.cropping import keep_crops
+
+            try:
+                keep_crops(folder, crops, workers)
+            except RunError as error:  # the rows are whole without a picture
+                sys.stderr.write(f"no crops: {error}\n")
         write_results(folder)
 
 
-def report(folder: Path) -> None:
+def report(folder: Path, crops: int = 0, workers: int = 1) -> None:
     """Make rows, tables, figures and report of a run folder again, of what is finished if the run still goes.
 
-    Raises InputError for a folder that is no run or holds no rows.
+    With `crops`, the pictures of so many worst frames of each box are made anew, by that many `workers`.
+    Raises InputError for a folder that is no run or holds no rows, RunError for crops that cannot be rendered.
     """
     from conespot.results import write_results
 
@@ -129,6 +139,10 @@ def report(folder: Path) -> None:
         raise InputError(f"{folder}: no such run folder; `campaign run NAME --out {folder}` makes one")
     with alone(folder):
         renew_rows(folder)
+        if crops:
+            from conespot.campaigns.cropping import keep_crops
+
+            keep_crops(folder, crops, workers)
         write_results(folder)
 
 

@@ -51,7 +51,7 @@ def run(options: argparse.Namespace) -> Ending:
     from conespot.campaigns.session import carry_out
 
     log = Log(options.log) if options.log else None
-    return _end(carry_out(document, options.out, executor_of(options), shard_of(options), log=log))
+    return _end(carry_out(document, options.out, executor_of(options), shard_of(options), log=log, crops=options.crops))
 
 
 def retry(options: argparse.Namespace) -> Ending:
@@ -86,7 +86,7 @@ def report(options: argparse.Namespace) -> Ending:
     """Make what a run folder holds again from its journal."""
     from conespot.campaigns.session import report
 
-    report(options.folder)
+    report(options.folder, options.crops, options.workers)
     say_results(options.folder)
     return Ending.DONE
 

@@ -12,6 +12,7 @@ from conespot.scene.power import BothConventions
 
 NOT_STATED = "not stated"
 _MOST = 4
+_OR = " or "
 
 Cases = Mapping[str, Case]
 #: what some rows are about: keys of cases, each with a localizer
@@ -34,9 +35,10 @@ class Assumptions:
         """The set as columns of a table."""
         return asdict(self)
 
-    def sentence(self) -> str:
-        """The set in one line."""
-        return "; ".join(f"{key.replace('_', ' ')}: {value}" for key, value in asdict(self).items())
+    def sentence(self, beside: Iterable[str] = ()) -> str:
+        """The set in one line, without the columns `beside` that are told elsewhere."""
+        told = {key: value for key, value in asdict(self).items() if key not in set(beside)}
+        return "; ".join(f"{key.replace('_', ' ')}: {value}" for key, value in told.items())
 
 
 def pairs(rows: pd.DataFrame) -> Pairs:
@@ -56,6 +58,16 @@ def together(sets: Iterable[Assumptions]) -> Assumptions:
     """What several sets assume, named where they differ."""
     columns = [one.columns() for one in dict.fromkeys(sets)]
     return Assumptions(**{name: either(one[name] for one in columns) for name in Assumptions().columns()})
+
+
+def common(sets: Iterable[Assumptions]) -> dict[str, str]:
+    """The columns in which several sets are equal, with what they say; none of no set."""
+    columns = [one.columns() for one in dict.fromkeys(sets)]
+    return (
+        {name: value for name, value in columns[0].items() if all(one[name] == value for one in columns)}
+        if columns
+        else {}
+    )
 
 
 def theory_assumptions() -> Assumptions:
@@ -93,6 +105,6 @@ def power_in_words(cases: Cases, about: Pairs, power_w: float) -> str:
 
 def either(words: Iterable[str]) -> str:
     """The distinct words in the order in which they come, such as "smooth or 15 bumps"."""
-    distinct = list(dict.fromkeys(words))
+    distinct = list(dict.fromkeys(one for said in words for one in said.split(_OR)))
     more = [f"{len(distinct) - _MOST} others"] if len(distinct) > _MOST else []
-    return " or ".join([*distinct[:_MOST], *more]) or NOT_STATED
+    return _OR.join([*distinct[:_MOST], *more]) or NOT_STATED

@@ -107,8 +107,10 @@ def verdict_table(verdicts: Sequence[Verdict]) -> Table:
     heading = f"{len(judged) - missed} of {len(judged)} hold" if judged else "nothing to judge"
     left = len(verdicts) - len(judged)
     more = f"{left} more are about what is not, or not unambiguously, in this run: `campaign check` says why."
-    assumed = (f"Assumes: {together(v.assumes for v in judged).sentence()}.",) if judged else ()
-    block = Block(heading, header, tuple(lines), (*([more] if left else ()), *assumed))
+    # theory assumes next to nothing, and Table I says so itself
+    of_frames = [v.assumes for v in judged if v.assumes != theory_assumptions()] or [v.assumes for v in judged]
+    assumed = together(of_frames) if judged else None
+    block = Block(heading, header, tuple(lines), (more,) if left else (), assumed)
     return Table("expectations", "Expectations of the campaign", pd.DataFrame(records), (block,))
 
 

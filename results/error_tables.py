@@ -185,7 +185,7 @@ def _error_block(
     header = ("error", "trajectory", "spotlights", "n", "failed", "AE", "paper", "ratio", "ME", "paper", "ratio")
     about = _about(cells)
     heading = f"{variant.label}, at {power_in_words(run.cases, about, records[0]['power_w'])}"
-    return Block(heading, header, lines, (*notes, f"Assumes: {assumptions(run.cases, about).sentence()}."))
+    return Block(heading, header, lines, notes, assumptions(run.cases, about))
 
 
 def _about(cells: Iterable[Cell]) -> Pairs:
@@ -219,11 +219,9 @@ def _by_power(run: Run, variant: Variant, cells: _Cells) -> tuple[_Records, Bloc
         line += [number(box["mean"]), number(box["max"]), number(relative)]
     errors = [text for unit in _UNITS.values() for text in (f"mean {unit}", f"max {unit}", "relative")]
     header = ("trajectory", "spotlights", "power [W]", "flux [mW]", "n", "failed", *errors)
-    notes = (
-        f"'relative' is the mean over the mean at {STEADY_ABOVE_W} W.",
-        f"Assumes: {assumptions(run.cases, _about(cells.values())).sentence()}.",
-    )
-    return records, Block(variant.label, header, tuple(map(tuple, lines.values())), notes)
+    notes = (f"'relative' is the mean over the mean at {STEADY_ABOVE_W} W.",)
+    together = assumptions(run.cases, _about(cells.values()))
+    return records, Block(variant.label, header, tuple(map(tuple, lines.values())), notes, together)
 
 
 POWER = ErrorTable("power", "Errors by light power", NOTES["Figs. 10, 11"], _by_power)

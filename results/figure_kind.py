@@ -14,9 +14,8 @@ from matplotlib.figure import Figure
 from conespot.results.assumptions import assumptions, pairs
 from conespot.results.paper_values import paper_table
 from conespot.results.run import Run
+from conespot.results.style import KINDS
 from conespot.results.variants import Variant
-
-_KINDS_OF_FILE = ("png", "svg")
 
 
 @dataclass(frozen=True)
@@ -82,7 +81,7 @@ class FigureKind(ABC):
     def made(self, file: str) -> bool:
         """Whether a file of that name is one of this kind's, now or in an earlier report."""
         begins = "|".join([re.escape(self.name), *(f"figure_{number}" for number in self.numbers.values())])
-        return re.fullmatch(rf"({begins})_.+\.({'|'.join(_KINDS_OF_FILE)})", file) is not None
+        return re.fullmatch(rf"({begins})_.+\.({'|'.join(KINDS)})", file) is not None
 
     def _number(self, cut: Cut) -> int | None:
         return self.numbers.get(cut.trajectory) if cut.surface == "smooth" else None

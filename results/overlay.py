@@ -98,7 +98,7 @@ def _whole(axes: Axes, overlay: Overlay) -> None:
 
 
 def _near(axes: Axes, overlay: Overlay) -> None:
-    _show(axes, overlay, _box(overlay))
+    _show(axes, overlay, window(overlay))
     axes.set_title("outlines", loc="left")
     left, top, right, bottom = _box(overlay)
     _draw_lines(axes, overlay)
@@ -110,7 +110,7 @@ def _near(axes: Axes, overlay: Overlay) -> None:
 
 def _masked(axes: Axes, overlay: Overlay) -> None:
     assert overlay.mask is not None
-    box = left, top, right, bottom = _box(overlay)
+    box = left, top, right, bottom = window(overlay)
     step = _step(box)
     shown = overlay.mask[top:bottom:step, left:right:step]
     axes.imshow(shown, cmap="gray", vmin=0, vmax=1, extent=(left, right, bottom, top), interpolation="nearest")
@@ -119,7 +119,7 @@ def _masked(axes: Axes, overlay: Overlay) -> None:
 
 
 def _left_over(axes: Axes, overlay: Overlay) -> None:
-    left, top, right, bottom = _box(overlay)
+    left, top, right, bottom = window(overlay)
     most = max(float(np.nanquantile(np.abs(r.values), 0.99)) for r in overlay.residuals) or 1.0
     for r in overlay.residuals:
         height, width = r.values.shape
@@ -150,7 +150,7 @@ def _show(axes: Axes, overlay: Overlay, box: tuple[int, int, int, int]) -> None:
     axes.imshow(shown, cmap="gray", vmin=0, vmax=1, extent=(left, right, bottom, top), interpolation="nearest")
 
 
-def _box(overlay: Overlay) -> tuple[int, int, int, int]:
+def window(overlay: Overlay) -> tuple[int, int, int, int]:
     """Left, top, right, bottom [px] of what is drawn, with a margin; the whole frame where nothing is."""
     height, width = overlay.image.shape[:2]
     drawn = [points for lines in overlay.lines.values() for points in lines if len(points)]

@@ -21,11 +21,11 @@ from conespot.results.style import COLOURS, frame, panel_title, paper_label, pla
 from conespot.results.variants import ordered
 
 #: per row of panels: what it shows, the signed parts, the overall error
-_PANELS = (
+PANELS = (
     ("Position", dict(zip("xyz", TIP_ERROR, strict=True)), "position_error_mm"),
     ("Rotation", {"about Y": "error_rot_y_deg", "about Z": "error_rot_z_deg"}, "rotation_error_deg"),
 )
-_MOST_RIGS = 4
+MOST_RIGS = 4
 _DASHED = (0, (5, 3))
 _LOG_ABOVE = 30.0  #: an error this many times the 75 % quantile would press all others flat
 
@@ -39,7 +39,7 @@ class AlongTrajectory(FigureKind):
 
     def caption(self, cut: Cut) -> str:
         """Power, failures, and what is assumed."""
-        rows = _at_reference(cut.rows)
+        rows = at_reference_power(cut.rows)
         failed = int((rows["status"] == "failed").sum())
         counted = f"{failed} of {len(rows)} frames failed{' (red crosses)' if failed else ''}."
         power = power_in_words(cut.run.cases, pairs(rows), float(rows["power_w"].iloc[0]))
@@ -47,10 +47,11 @@ class AlongTrajectory(FigureKind):
 
     def draw(self, cut: Cut, title: str, caption: str) -> Figure:
         """The figure at that power."""
-        return pose_figure(_at_reference(cut.rows), title, caption, cut.paper_table)
+        return pose_figure(at_reference_power(cut.rows), title, caption, cut.paper_table)
 
 
-def _at_reference(rows: pd.DataFrame) -> pd.DataFrame:
+def at_reference_power(rows: pd.DataFrame) -> pd.DataFrame:
+    """The rows at 1 W, or else at the highest power."""
     return rows[rows["power_w"] == reference_power(set(rows["power_w"]))]
 
 
@@ -59,11 +60,11 @@ def pose_figure(rows: pd.DataFrame, title: str, caption: str, source: str | None
 
     `rows` are those of one variant, surface, trajectory and power; `source` names the table whose AE is drawn.
     """
-    rigs = ordered(rows["spotlights"])[:_MOST_RIGS]
+    rigs = ordered(rows["spotlights"])[:MOST_RIGS]
     figure = Figure(figsize=(1.2 + 4.6 * max(len(rigs), 1.35), 6.6), layout="constrained")
     frame(figure, title, caption)
-    grid = figure.subplots(len(_PANELS), len(rigs), sharex=True, sharey="row", squeeze=False)
-    for row, (what, parts, overall) in enumerate(_PANELS):
+    grid = figure.subplots(len(PANELS), len(rigs), sharex=True, sharey="row", squeeze=False)
+    for row, (what, parts, overall) in enumerate(PANELS):
         most = float(rows.loc[rows["status"] == "ok", overall].max())
         published = paper_means(source, str(rows["trajectory"].iloc[0]), rigs, overall, most)
         for k, rig in enumerate(rigs):

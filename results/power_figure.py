@@ -18,7 +18,7 @@ from conespot.results.paper_values import REFERENCE_POWER_W, paper_means
 from conespot.results.style import COLOURS, frame, panel_title, paper_label, plain_numbers
 from conespot.results.variants import ordered
 
-_PANELS = (("Position", "position_error_mm"), ("Rotation", "rotation_error_deg"))
+PANELS = (("Position", "position_error_mm"), ("Rotation", "rotation_error_deg"))
 _MOST_RIGS = 4
 _MOST_POWERS = 60  #: more boxes than that nobody tells apart
 _PAPER: dict[str, Any] = {"markersize": 6.0, "markerfacecolor": "none", "color": COLOURS["paper"]}
@@ -50,7 +50,7 @@ class OverPower(FigureKind):
             for power in (float(powers.min()), float(powers.max()))
         )
         counted = f"{failed} of {frames} frames failed{red}; boxes hold the others. From {least} to {most}."
-        count, shown = int(powers.nunique()), len(_shown(cut.boxes))
+        count, shown = int(powers.nunique()), len(shown_powers(cut.boxes))
         thinned = f" {shown} of {count} powers are drawn, boxes.csv holds all." if shown < count else ""
         return f"{_TUKEY} {counted}{thinned}\n{cut.assumed}"
 
@@ -64,16 +64,16 @@ def power_figure(boxes: pd.DataFrame, title: str, caption: str, source: str | No
 
     `boxes` are those of one variant, surface and trajectory; `source` names the table whose AE at 1 W is drawn.
     """
-    rigs = ordered(boxes["spotlights"])[:_MOST_RIGS]
-    powers = _shown(boxes)
+    rigs = rigs_shown(boxes)
+    powers = shown_powers(boxes)
     boxes = boxes[boxes["power_w"].isin(powers)]
     wide = max(4.2, 0.9 + 0.42 * len(powers))
     figure = Figure(figsize=(min(1.6 + wide * max(len(rigs), 1.3), 30.0), 6.8), layout="constrained")
     frame(figure, title, caption)
-    grid = figure.subplots(len(_PANELS), len(rigs), sharex=True, sharey="row", squeeze=False)
+    grid = figure.subplots(len(PANELS), len(rigs), sharex=True, sharey="row", squeeze=False)
     pad = 15.0 if boxes["failed"].any() else 7.0  # the numbers of failed frames stand below the titles
     paper = source if REFERENCE_POWER_W in powers else None
-    for row, (what, metric) in enumerate(_PANELS):
+    for row, (what, metric) in enumerate(PANELS):
         here = boxes[boxes["metric"] == metric]
         published = paper_means(paper, str(boxes["trajectory"].iloc[0]), rigs, metric, float(here["max"].max()))
         _scale(grid[row, 0], here, max(published.values(), default=0.0))
@@ -94,7 +94,12 @@ def power_figure(boxes: pd.DataFrame, title: str, caption: str, source: str | No
     return figure
 
 
-def _shown(boxes: pd.DataFrame) -> list[float]:
+def rigs_shown(boxes: pd.DataFrame) -> list[str]:
+    """The rigs that are drawn, a column each."""
+    return [str(rig) for rig in ordered(boxes["spotlights"])[:_MOST_RIGS]]
+
+
+def shown_powers(boxes: pd.DataFrame) -> list[float]:
     """The powers that are drawn: all, or so many of them from the least to the most."""
     powers = sorted(boxes["power_w"].unique())
     places = np.linspace(0, len(powers) - 1, min(len(powers), _MOST_POWERS)).round().astype(int)
@@ -140,11 +145,18 @@ def _bxp(box: dict[Any, Any]) -> dict[str, Any]:
     return {**{word: box[name] for word, name in words.items()}, "fliers": np.asarray(box["outliers"], float)}
 
 
+def on_log_scale(boxes: pd.DataFrame, published: float) -> bool:
+    """Whether outliers lie so far beyond the boxes that a linear axis would show nothing else."""
+    drawn = boxes[boxes["n"] > 0]
+    most = max(drawn["max"].max(), published) if len(drawn) else published
+    return bool(len(drawn) and most > _LOG_ABOVE * drawn["q3"].max() and (drawn["min"] > 0.0).all())
+
+
 def _scale(axes: Axes, boxes: pd.DataFrame, published: float) -> None:
     """Logarithmic where the outliers lie far beyond the boxes, else linear from zero. Panels share it."""
     drawn = boxes[boxes["n"] > 0]
     most = max(drawn["max"].max(), published) if len(drawn) else published
-    if len(drawn) and most > _LOG_ABOVE * drawn["q3"].max() and (drawn["min"] > 0.0).all():
+    if on_log_scale(boxes, published):
         axes.set_yscale("log")
         plain_numbers(axes.yaxis)
     else:

@@ -11,7 +11,7 @@ from matplotlib.figure import Figure
 from conespot.results.assumptions import assumptions, pairs
 from conespot.results.figure_kind import Cut, FigureKind
 from conespot.results.reality_gap import EFFECT, Cost, costs, is_gap, names
-from conespot.results.style import COLOURS, frame, plain_numbers
+from conespot.results.style import COLOURS, KINDS, frame, plain_numbers
 
 _MOST_LIGHTS, _MOST_EFFECTS, _MOST_LOCALIZERS = 4, 40, 6
 _MARKS = "osD^vP"
@@ -39,7 +39,7 @@ class RealityGap(FigureKind):
 
     def made(self, file: str) -> bool:
         """Whether a file is this figure."""
-        return file in (f"{self.name}.png", f"{self.name}.svg")
+        return file in {f"{self.name}.{kind}" for kind in KINDS}
 
     def caption(self, cut: Cut) -> str:
         """What a mark is."""

@@ -12,7 +12,7 @@ from typing import Any
 
 import pandas as pd
 
-from conespot.results.assumptions import assumptions, pairs
+from conespot.results.assumptions import assumptions, pairs, together
 from conespot.results.run import Run
 from conespot.results.table import Block, Table, number
 
@@ -82,13 +82,12 @@ def reality_table(run: Run) -> Table | None:
                     about = {"localizer": localizer, EFFECT: effect, "illumination": light, "frames": cost.frames}
                     numbers = {"refused": cost.refused, "median_mm": cost.median, "max_mm": cost.worst}
                     over = {"over_first": cost.median / ideal if ideal else math.nan}
-                    assumes = assumed[localizer, effect, light].columns()
-                    records.append({**about, **numbers, **over, **assumes})
+                    sets = assumed[localizer, effect, light].columns()
+                    records.append({**about, **numbers, **over, **sets})
             lines.append(tuple(cells))
         header = tuple(part for light in lights for part in (f"{light} [um]", "refused"))
-        sets = dict.fromkeys(one for (name, _, _), one in assumed.items() if name == localizer)
-        notes = tuple(f"Assumes {one.sentence()}." for one in sets)
-        blocks.append(Block(localizer, (EFFECT, *header), tuple(lines), notes[:_MOST_NAMED]))
+        assumes = together(one for (name, _, _), one in assumed.items() if name == localizer)
+        blocks.append(Block(localizer, (EFFECT, *header), tuple(lines), (), assumes))
     return Table("reality_gap", "The reality gap", pd.DataFrame(records), tuple(blocks), (_NOTE,))
 
 

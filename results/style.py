@@ -14,6 +14,7 @@ import matplotlib as mpl
 from matplotlib.axes import Axes
 from matplotlib.axis import Axis
 from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.backends.backend_pdf import FigureCanvasPdf
 from matplotlib.backends.backend_svg import FigureCanvasSVG
 from matplotlib.figure import Figure
 from matplotlib.ticker import FuncFormatter
@@ -56,10 +57,14 @@ _RC: Any = {
     "legend.frameon": False,
     "legend.fontsize": 8.5,
     "svg.hashsalt": "conespot",
+    "pdf.fonttype": 42,  # text that can be searched and edited
     "path.simplify": True,
 }
 _DPI = 150
 _NO_DATE = {"Date": None, "Creator": None}
+_UNDATED = {"CreationDate": None, "Creator": None, "Producer": None}
+#: what a figure is written as
+KINDS = ("png", "svg", "pdf")
 
 
 @contextmanager
@@ -73,24 +78,24 @@ def style() -> Iterator[None]:
 
 def files(stem: Path) -> list[Path]:
     """What `save` writes."""
-    return [stem.with_name(f"{stem.name}.{kind}") for kind in ("png", "svg")]
+    return [stem.with_name(f"{stem.name}.{kind}") for kind in KINDS]
 
 
 def save(figure: Figure, stem: Path) -> list[Path]:
-    """Write `stem`.png and `stem`.svg, without dates or versions. Call it inside `style`. Raises InputError."""
-    png, svg = files(stem)
-    image, drawing = io.BytesIO(), io.BytesIO()
+    """Write `stem`.png, .svg and .pdf, without dates or versions. Call it inside `style`. Raises InputError."""
+    written = dict(zip(KINDS, (io.BytesIO() for _ in KINDS), strict=True))
     figure.set_dpi(_DPI)
     canvas = FigureCanvasAgg(figure)
     layout = figure.get_layout_engine()
     if layout is not None:  # once: it costs as much as drawing, and both files then agree
         layout.execute(figure)
         figure.set_layout_engine("none")
-    canvas.print_png(image, metadata={"Software": None})  # type: ignore[no-untyped-call]
-    FigureCanvasSVG(figure).print_svg(drawing, metadata=_NO_DATE)  # type: ignore[no-untyped-call]
-    write_atomically(png, image.getvalue())
-    write_atomically(svg, drawing.getvalue())
-    return [png, svg]
+    canvas.print_png(written["png"], metadata={"Software": None})  # type: ignore[no-untyped-call]
+    FigureCanvasSVG(figure).print_svg(written["svg"], metadata=_NO_DATE)  # type: ignore[no-untyped-call]
+    FigureCanvasPdf(figure).print_pdf(written["pdf"], metadata=_UNDATED)  # type: ignore[no-untyped-call]
+    for path, stream in zip(files(stem), written.values(), strict=True):
+        write_atomically(path, stream.getvalue())
+    return files(stem)
 
 
 def frame(figure: Figure, title: str, caption: str) -> None:

@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import pandas as pd
+
+from conespot.results.assumptions import Assumptions, common
 
 _MOST_BLOCKS = 24
 _MOST_LINES = 400
@@ -15,12 +17,13 @@ _MOST_LINES = 400
 
 @dataclass(frozen=True)
 class Block:
-    """A part of a table for the eye; `notes` say what its numbers assume."""
+    """A part of a table for the eye; `assumes` is what its numbers assume, where the notes do not say it."""
 
     heading: str
     header: tuple[str, ...]
     lines: tuple[tuple[str, ...], ...]
     notes: tuple[str, ...]
+    assumes: Assumptions | None = None
 
     @cached_property  # a template asks for every line
     def flush_right(self) -> tuple[bool, ...]:
@@ -42,10 +45,7 @@ class Table:
     @property
     def shown(self) -> tuple[Block, ...]:
         """The blocks that people are shown: a sweep over thousands of values stays readable."""
-        return tuple(
-            Block(block.heading, block.header, block.lines[:_MOST_LINES], block.notes)
-            for block in self.blocks[:_MOST_BLOCKS]
-        )
+        return tuple(replace(block, lines=block.lines[:_MOST_LINES]) for block in self.blocks[:_MOST_BLOCKS])
 
     @property
     def left_out(self) -> str:
@@ -53,6 +53,24 @@ class Table:
         blocks = len(self.blocks) - len(self.shown)
         lines = sum(len(block.lines) for block in self.blocks) - sum(len(block.lines) for block in self.shown)
         return f"{blocks} more blocks ({lines} lines) stand in tables/{self.name}.csv." if lines else ""
+
+    @property
+    def shared(self) -> dict[str, str]:
+        """What all blocks assume alike, by column: it is told once."""
+        return common(block.assumes for block in self.blocks if block.assumes is not None)
+
+    def notes_of(self, block: Block) -> tuple[str, ...]:
+        """The notes of a block, with what it assumes beyond `shared`."""
+        own = block.assumes.sentence(beside=self.shared) if block.assumes is not None else ""
+        return (*block.notes, f"Assumes: {own}.") if own else block.notes
+
+    @property
+    def last_notes(self) -> tuple[str, ...]:
+        """The notes of the whole, with what all blocks assume and what `shown` leaves out."""
+        shared = Assumptions(**self.shared).sentence(beside=Assumptions().columns().keys() - self.shared.keys())
+        several = "All of them assume" if len(self.blocks) > 1 else "Assumes"
+        assumed = f"{several}: {shared}." if shared else ""
+        return tuple(note for note in (*self.notes, assumed, self.left_out) if note)
 
     def text(self) -> str:
         """The table for the terminal, numbers flush right."""
@@ -62,8 +80,8 @@ class Table:
             widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
             lines = [_line(row, widths, block.flush_right) for row in rows]
             lines.insert(1, "  ".join("-" * width for width in widths))
-            parts.append("\n".join([block.heading, *("  " + line for line in lines), *block.notes]))
-        return "\n\n".join([*parts, *(note for note in (*self.notes, self.left_out) if note)]) + "\n"
+            parts.append("\n".join([block.heading, *("  " + line for line in lines), *self.notes_of(block)]))
+        return "\n\n".join([*parts, *self.last_notes]) + "\n"
 
     def markdown(self) -> str:
         """The table as GitHub-flavoured markdown."""
@@ -73,8 +91,8 @@ class Table:
             rows.insert(1, ["--:" if right else "---" for right in block.flush_right])
             parts.append(f"### {_escaped(block.heading)}")
             parts.append("\n".join(f"| {' | '.join(row)} |" for row in rows))
-            parts += [_escaped(note) for note in block.notes]
-        return "\n\n".join([*parts, *(_escaped(note) for note in (*self.notes, self.left_out) if note)]) + "\n"
+            parts += [_escaped(note) for note in self.notes_of(block)]
+        return "\n\n".join([*parts, *map(_escaped, self.last_notes)]) + "\n"
 
 
 def number(value: float) -> str:

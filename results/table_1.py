@@ -34,7 +34,7 @@ def table_1(run: Run) -> Table | None:
         records.append({"half_angle_deg": angle, **numbers, **sets.columns()})
         lines.append((f"{angle:g}", *map(_hundredths, numbers.values())))
     header = ("half angle [deg]", "in plane [um]", "paper", "difference", "ratio", "in 3D [um]", "in 3D, volume [um]")
-    block = Block("closed form, no images", header, tuple(lines), (f"Assumes: {sets.sentence()}.",))
+    block = Block("closed form, no images", header, tuple(lines), (), sets)
     title = "Table I: greatest difference between cone-sphere curve and ellipse"
     return Table("table_1", title, pd.DataFrame(records), (block,), (NOTES["Table I"],))
 

@@ -10,7 +10,7 @@ from conespot.campaigns.command import main
 
 CAMPAIGN = [sys.executable, "-m", "conespot"]
 FILES = {"table_1.csv", "bounds.csv", "budget.csv", "design.csv", "theory.txt"}
-FILES |= {f"{name}.{kind}" for name in ("budget", "design") for kind in ("png", "svg")}
+FILES |= {f"{name}.{kind}" for name in ("budget", "design") for kind in ("png", "svg", "pdf")}
 
 
 def theory(*arguments, cwd):

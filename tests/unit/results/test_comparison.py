@@ -112,7 +112,7 @@ def test_a_run_gets_text_table_and_figures_with_its_exposures(two_lights, make_r
     assert "ir850 assumes: radius: 12.5 mm; edge: Cycles blend 1 (fully soft), half angle 9 deg; power conv" in text
     assert "2007 edition; dose: ICNIRP 2013, aphakic; research estimate, not a safety assessment" in text
     assert {"median_mm", "p", "pairs", "failed_a"} <= set(pd.read_csv(folder / "tables" / "comparison.csv").columns)
-    assert len(list((folder / "figures").glob("comparison_ir850_led-b3_*"))) == 2
+    assert len(list((folder / "figures").glob("comparison_ir850_led-b3_*"))) == 3
 
 
 def test_one_light_has_nothing_to_compare(make_rows, make_run, tmp_path):

@@ -80,7 +80,7 @@ def test_another_kind_is_drawn_and_cleared_by_its_name_alone(tmp_path, make_run,
     with monkeypatch.context() as patch:
         patch.setitem(figures.FIGURES, "largest", Largest())
         assert {path.name for path in write_results(folder) if path.name.startswith("largest")} == {
-            f"largest_box_smooth_paper-code.{kind}" for kind in ("png", "svg")
+            f"largest_box_smooth_paper-code.{kind}" for kind in ("png", "svg", "pdf")
         }
         (folder / "figures" / "largest_helix_smooth_paper-code.svg").touch()
         write_results(folder)

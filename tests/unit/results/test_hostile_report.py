@@ -21,7 +21,8 @@ def test_every_word_of_a_run_is_escaped_in_its_report(tmp_path, make_rows, make_
     folder = make_run(tmp_path / "run", frame, described=described, document=document)
     write_results(folder)
     report = (folder / "report.html").read_text()
-    assert "<script" not in report
+    assert SCRIPT not in report
+    assert "<script>alert" not in report
     assert "alert(&#39;1&#39;)" in report
     assert "49" not in report.split("<title>")[1].split("</title>")[0]
     for drawing in (folder / "figures").glob("*.svg"):

@@ -1,6 +1,8 @@
 """write_results, the report, and `python -m conespot.results`: a run folder alone is enough, and is not trusted."""
 
 import base64
+import hashlib
+import json
 import os
 import re
 import shutil
@@ -35,6 +37,28 @@ class Tags(HTMLParser):
         self.found.append((tag, dict(attrs)))
 
 
+class Page(Tags):
+    """A report apart: the scripts that run, the data of its charts, and everything that is neither, with its tags."""
+
+    def __init__(self, text):
+        self.programs, self.data, self._kind = [], [], None
+        super().__init__(text)
+        self.prose = re.sub(r"<(script|style)[^>]*>.*?</\1>", "", text, flags=re.DOTALL)
+
+    def handle_starttag(self, tag, attrs):
+        super().handle_starttag(tag, attrs)
+        self._kind = (self.data if dict(attrs).get("type") else self.programs) if tag == "script" else None
+        if self._kind is not None:
+            self._kind.append("")
+
+    def handle_endtag(self, tag):
+        self._kind = None
+
+    def handle_data(self, data):
+        if self._kind is not None:
+            self._kind[-1] += data
+
+
 def test_a_run_folder_gets_every_file_and_no_other(written):
     folder, files = written
     names = {str(path.relative_to(folder)) for path in files}
@@ -42,7 +66,7 @@ def test_a_run_folder_gets_every_file_and_no_other(written):
     assert names == (
         {"boxes.csv", "report.html"}
         | {f"tables/{t}" for t in ("table_1.csv", "table_4.csv", "table_5.csv", "power.csv", "tables.txt", "tables.md")}
-        | {f"figures/{f}_paper-code.{kind}" for f in figures for kind in ("png", "svg")}
+        | {f"figures/{f}_paper-code.{kind}" for f in figures for kind in ("png", "svg", "pdf")}
     )
     on_disk = {os.path.relpath(os.path.join(d, f), folder) for d, _, found in os.walk(folder) for f in found}
     assert on_disk == names | {"campaign.yaml", "cases.jsonl", "errors.parquet", "theory.csv"}
@@ -62,14 +86,35 @@ def test_somebody_elses_copy_with_csv_rows_gives_the_same_bytes(written, tmp_pat
 
 
 def test_the_report_needs_nothing_beside_it(written):
-    folder, files = written
-    tags = Tags((folder / "report.html").read_text()).found
-    assert not {tag for tag, _ in tags} & {"script", "link", "iframe", "object", "embed", "base", "form"}
+    text = (written[0] / "report.html").read_text()
+    tags = Tags(text).found
+    assert not {tag for tag, _ in tags} & {"link", "iframe", "object", "embed", "base"}
     links = [value for _, attrs in tags for key, value in attrs.items() if key in ("src", "href", "srcset", "action")]
+    assert links
     assert all(value.startswith(("data:image/png;base64,", "#")) for value in links)
-    images = [base64.b64decode(value.split(",")[1]) for value in links if value.startswith("data:")]
-    assert sorted(images) == sorted(path.read_bytes() for path in files if path.suffix == ".png")
-    assert "url(" not in (folder / "report.html").read_text()
+    assert "url(" not in Page(text).prose
+
+
+def test_only_the_report_s_own_two_scripts_may_run_in_it(written):
+    page = Page((written[0] / "report.html").read_text())
+    policy = next(attrs["content"] for tag, attrs in page.found if attrs.get("http-equiv") == "Content-Security-Policy")
+    assert policy.startswith("default-src 'none'; ")
+    allowed = re.findall(r"'sha256-([^']+)'", policy)
+    hashes = [base64.b64encode(hashlib.sha256(script.encode()).digest()).decode() for script in page.programs]
+    assert hashes == allowed
+    assert len(hashes) == 2
+    assert "unsafe-inline" not in policy.split("script-src")[1]
+
+
+def test_every_figure_of_the_run_is_a_chart_of_the_report(written):
+    page = Page((written[0] / "report.html").read_text())
+    charts = [json.loads(data) for data in page.data]
+    shown = [chart for chart in charts if any(trace["type"] == "box" for trace in chart["data"])]
+    boxes = pd.read_csv(written[0] / "boxes.csv")
+    means = {round(mean, 9) for chart in shown for t in chart["data"] if t.get("name") == "mean" for mean in t["y"]}
+    smooth = boxes[boxes["metric"].isin(["position_error_mm", "rotation_error_deg"]) & (boxes["surface"] == "smooth")]
+    assert means == {float(f"{mean:.5g}") for mean in smooth["mean"]}
+    assert {f"Fig. {n}" for n in (8, 9, 10, 11)} <= set(re.findall(r"Fig\. \d+", page.prose))
 
 
 def test_the_report_says_what_a_reader_must_know(written):
@@ -113,9 +158,14 @@ def test_hostile_text_stays_text(tmp_path, make_run, make_rows, make_cases, make
     folder = make_run(tmp_path / "run", frame, document=document, described=described)
     write_results(folder)
     text = (folder / "report.html").read_text()
-    assert "script" not in {tag for tag, _ in Tags(text).found}
+    page = Page(text)
+    assert len(page.programs) == 2
+    assert evil not in text
     assert text.count("&lt;script&gt;") > 5
-    assert "49" not in re.sub(r"base64,[^\"]*", "", re.sub(r"0\.\d+|\d+\.\d+", "", text))
+    charts = [json.loads(data) for data in page.data]
+    assert "{{ 7*7 }}" in json.dumps(charts)
+    assert "<script" not in json.dumps(charts)
+    assert "49" not in re.sub(r"base64,[^\"]*|'sha256-[^']*'", "", re.sub(r"0\.\d+|\d+\.\d+", "", page.prose))
     assert "<script>" not in (folder / "tables" / "tables.md").read_text()
 
 

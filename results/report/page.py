@@ -1,57 +1,109 @@
-"""The report: one HTML file that needs nothing beside it, and trusts nothing that stands in the run."""
+"""The page: sections of a template, filled from a run; its two scripts and nothing else may run in it."""
 
 from __future__ import annotations
 
 import base64
+import hashlib
+import importlib.util
 from collections.abc import Sequence
+from importlib import resources
 from pathlib import Path
 from typing import Any
 
 import jinja2
+from markupsafe import Markup
 
-from conespot.results.assumptions import Assumptions, assumptions, pairs
+from conespot.results.assumptions import assumptions, pairs
 from conespot.results.columns import SETTING, column
+from conespot.results.crops import read_crops
 from conespot.results.figures import Drawing
 from conespot.results.light_exposure import light_exposures
 from conespot.results.makers import maker_block, read_makers
 from conespot.results.paper_values import CITATION
+from conespot.results.report.assumed import assumed
+from conespot.results.report.charts import figure_charts, numbers_of, path_charts, pictures, survey_charts
+from conespot.results.report.gallery import LINES, gallery
+from conespot.results.report.summary import summary
+from conespot.results.report.theory import theory_tables
+from conespot.results.report.words import share
 from conespot.results.run import Run
 from conespot.results.table import Block, Table, number
 from conespot.results.variants import AXES, by_axes, ordered, split
+from conespot.scene import InputError
 
 _MOST_LINES = 300
 _MOST_TEXT = 100_000
+#: tables that are laid beside published values, which come first
+_PUBLISHED = ("expectations", "table_1", "table_4", "table_5", "released", "white")
 
 
 def make_report(run: Run, tables: Sequence[Table], drawings: Sequence[Drawing], left_out: int, figures: Path) -> bytes:
-    """The report as HTML. The PNG of the `drawings` stand in the folder `figures`; they are inlined as base64."""
+    """The report as HTML. The PNG of drawings that cannot be touched stand in the folder `figures`, and are inlined."""
+    data = run.document.data
+    crops = read_crops(run.folder)
+    surveys = survey_charts(run)
+    first = [table for name in _PUBLISHED for table in tables if table.name == name]
+    return fill(
+        "page.html",
+        name=run.name,
+        description=str(data.get("description") or "")[:4000],
+        summary=summary(run),
+        tiles=_tiles(run),
+        facts=_facts(run),
+        published=first,
+        others=[table for table in tables if table not in first],
+        theory=theory_tables(run.folder),
+        figures=figure_charts(drawings),
+        numbers=numbers_of(drawings),
+        pictures=[(drawing, _inlined(figures / f"{drawing.name}.png")) for drawing in pictures(drawings)],
+        left_out=left_out,
+        paths=path_charts(run),
+        surveys=surveys,
+        gallery=gallery(run, crops),
+        crops=crops,
+        lines=LINES,
+        powers=_powers(run),
+        failures=_failures(run),
+        assumed=assumed(run),
+        seed=str(data.get("seed", "not stated")),
+        versions=_versions(data.get("made_with")),
+        makers=maker_block(read_makers(run.folder)),
+        resolved=(run.folder / "campaign.yaml").read_text(encoding="utf-8")[:_MOST_TEXT],
+        citation=CITATION,
+    )
+
+
+def fill(template: str, **content: Any) -> bytes:
+    """A template of this folder as a page with style and scripts in it, and a policy that lets nothing else run."""
     environment = jinja2.Environment(
-        loader=jinja2.PackageLoader("conespot.results", "."),
+        loader=jinja2.PackageLoader("conespot.results.report", "."),
         autoescape=True,
         undefined=jinja2.StrictUndefined,
         trim_blocks=True,
         lstrip_blocks=True,
     )
-    data = run.document.data
-    return (
-        environment.get_template("report.html")
-        .render(
-            name=run.name,
-            description=str(data.get("description") or "")[:4000],
-            facts=_facts(run),
-            tables=tables,
-            figures=[(drawing, _inlined(figures / f"{drawing.name}.png")) for drawing in drawings],
-            left_out=left_out,
-            powers=_powers(run),
-            failures=_failures(run),
-            assumed=_assumption_sets(run),
-            versions=_versions(data.get("made_with")),
-            makers=maker_block(read_makers(run.folder)),
-            resolved=(run.folder / "campaign.yaml").read_text(encoding="utf-8")[:_MOST_TEXT],
-            citation=CITATION,
-        )
-        .encode()
+    here = resources.files("conespot.results.report")
+    scripts = [_plotly(), (here / "script.js").read_text("utf-8")]
+    page = environment.get_template(template).render(
+        style=Markup((here / "style.css").read_text("utf-8")),
+        scripts=[Markup(script) for script in scripts],
+        allowed=" ".join(f"'sha256-{_hash(script)}'" for script in scripts),
+        **content,
     )
+    return page.encode()
+
+
+def _plotly() -> str:
+    """The plotting library's script. Raises InputError."""
+    found = importlib.util.find_spec("plotly")  # without importing it, which takes long
+    path = Path(*(found.submodule_search_locations or [""])[:1]) / "package_data" / "plotly.min.js" if found else Path()
+    if not path.is_file():
+        raise InputError("the report needs the package plotly, which is not installed whole: pip install plotly")
+    return path.read_text("utf-8")
+
+
+def _hash(script: str) -> str:
+    return base64.b64encode(hashlib.sha256(script.encode()).digest()).decode("ascii")
 
 
 def _inlined(path: Path) -> str:
@@ -121,21 +173,24 @@ def _failures(run: Run) -> Block | None:
     return Block("", header, tuple(lines[:_MOST_LINES]), notes) if lines else None
 
 
-def _assumption_sets(run: Run) -> Block | None:
-    """A line a variant, and one a surface where it has several."""
-    if run.rows is None:
-        return None
-    lines: list[tuple[str, ...]] = []
-    for variant, part in split(run.rows.frame, run.rows.group)[:_MOST_LINES]:
-        surfaces = ordered(part["surface"])
-        for surface in surfaces:
-            label = f"{variant.label}, {surface}" if len(surfaces) > 1 else variant.label
-            lines.append((label, *assumptions(run.cases, pairs(part[part["surface"] == surface])).columns().values()))
-    names = (name.replace("_", " ") for name in Assumptions().columns())
-    return Block("", ("numbers of", *names), tuple(lines[:_MOST_LINES]), ())
-
-
 def _versions(made_with: Any) -> list[tuple[str, str]]:
     if not isinstance(made_with, dict):
         return []
     return [(str(name)[:80], str(version)[:200]) for name, version in list(made_with.items())[:60]]
+
+
+def _tiles(run: Run) -> list[tuple[str, str, str]]:
+    """The few numbers that a glance should find: each with what it is and in which words."""
+    if run.rows is None:
+        return []
+    frame = run.rows.frame
+    ok = frame["status"] == "ok"
+    errors = frame.loc[ok, "position_error_mm"]
+    median = f"{1e3 * errors.median():.3g} um" if len(errors) else "–"
+    worst = f"largest {1e3 * errors.max():.3g} um" if len(errors) else "nothing was localized"
+    return [
+        (f"{len(frame):,}", "answers", f"{frame['pose'].nunique():,} poses, {frame['case'].nunique():,} cases"),
+        (share(int(ok.sum()), len(frame)), "localized", f"{int((~ok).sum()):,} refused"),
+        (median, "median tip error", f"over all settings; {worst}"),
+        (f"{frame['localizer'].nunique()}", "localizers", f"at {frame['power_w'].nunique()} powers"),
+    ]
