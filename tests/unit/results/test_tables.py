@@ -60,7 +60,8 @@ def test_every_number_has_its_assumption_set(tables_of, make_rows):
     for table in made.values():
         assert list(table.frame.columns[-7:]) == ASSUMED
         assert table.frame[ASSUMED].map(bool).all().all()
-        assert all("Assumes: radius: 1" in block.notes[-1] for block in table.blocks)
+        assert all(block.assumes.radius.startswith("1") for block in table.blocks)
+        assert "radius: 1" in table.text()
 
 
 def test_table_v_compares_bumps_with_the_paper_and_with_smooth(tables_of, make_rows):
@@ -83,7 +84,8 @@ def test_bumps_are_stated_beside_their_numbers_and_nowhere_else(tables_of, make_
     power = made["power"].frame
     assert (power["surface_shape"].eq(bumps) == power["surface"].eq("bumps")).all()
     for name, words in {"table_4": "smooth", "table_5": bumps, "power": f"smooth or {bumps}"}.items():
-        assert f"surface shape: {words};" in made[name].blocks[0].notes[-1]
+        assert made[name].blocks[0].assumes.surface_shape == words
+        assert f"surface shape: {words};" in made[name].text()
 
 
 def test_a_run_that_describes_no_cases_says_so_beside_every_number(tables_of, make_rows):

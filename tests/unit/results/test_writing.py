@@ -139,7 +139,7 @@ def test_the_report_says_what_a_reader_must_know(written):
 def test_the_failures_in_the_report_add_up(written):
     folder, _ = written
     text = (folder / "report.html").read_text()
-    section = text[text.index('id="failures"') : text.index('id="assumptions"')]
+    section = text[text.index('id="failures"') : text.index('id="tables"')]
     lines = [re.findall(r"<td[^>]*>([^<]*)</td>", line) for line in section.split("<tr>")[2:]]
     failed = (pd.read_parquet(folder / "errors.parquet")["status"] == "failed").sum()
     assert sum(int(line[5]) for line in lines) == failed > 0
