@@ -100,7 +100,7 @@ def _whole(axes: Axes, overlay: Overlay) -> None:
 def _near(axes: Axes, overlay: Overlay) -> None:
     _show(axes, overlay, window(overlay))
     axes.set_title("outlines", loc="left")
-    left, top, right, bottom = _box(overlay)
+    left, top, right, bottom = window(overlay)
     _draw_lines(axes, overlay)
     axes.set_xlim(left, right)  # a needle may lead out of what is shown
     axes.set_ylim(bottom, top)
