@@ -21,7 +21,7 @@ from conespot.localize.image import AnyImage, Frame
 from conespot.localize.model.estimate import Estimate
 from conespot.localize.model.knowns import Knowns
 from conespot.localize.model.noise import NoiseModel
-from conespot.localize.model.solve import inverse
+from conespot.localize.model.solve import inverse, reduction
 from conespot.localize.outcome import LocalizationFailure
 from conespot.localize.start.search import find_start
 from conespot.scene.document import InputError
@@ -153,7 +153,7 @@ def calibrate(
             start = find_start(frame, now)
             if isinstance(start, LocalizationFailure):
                 continue
-            fit = fit_edge(frame, Estimate(start.pose, now), tight, sensor)
+            fit = fit_edge(frame, Estimate(start.pose, now), tight.within(now), sensor)
             if not isinstance(fit, LocalizationFailure) and fit.settled:
                 terms.append(_seen(*_term(fit, now, tight, width), widths))
         if len(terms) < 3:
@@ -242,11 +242,13 @@ def _term(fit: EdgeFit, scene: Scene, tight: Knowns, width: Width) -> tuple[Arra
         rows[k, own:] = unit
     miss = np.array([u @ offset, v @ offset])
     # the frame's own priors come off again; at its minimum the data's slope is theirs turned round
-    data = fit.information.copy()
+    # light from under the retina is each frame's own, as it falls on another place
+    others = reduction(fit.information, own)
+    data = others @ fit.information @ others.T if len(fit.information) > own else fit.information.copy()
     data[np.arange(size, own), np.arange(size, own)] -= own_prior
     slope = np.concatenate([np.zeros(size), own_prior * (here - nominal)])
     # as tight as it was: a patch that is small is fitted through the RCM itself
-    tie = fit.prior[:2]
+    tie = fit.prior[:2, :own]
     data -= tie.T @ tie
     slope += tie.T @ (miss * float(np.linalg.norm(tie[0, :3])))
     # the same slope where the common quantities have the scene's values

@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from conespot.localize.image import AnyImage, Frame, Reference, white_level
+from conespot.localize.model.deep import Deep
 from conespot.localize.model.estimate import Estimate
 from conespot.localize.model.knowns import Knowns
 from conespot.localize.model.noise import NoiseModel
@@ -34,6 +35,8 @@ class SequenceSettings:
     #: patch in the view of the retina would be taken for albedo
     margin: float = 0.25
     margin_px: float = 3.0
+    #: share of the light from under the retina that may come back beyond that
+    glow: float = 0.05
     #: frames without which there is no view: one hides what its own patch covers
     fewest: int = 2
 
@@ -52,6 +55,9 @@ class AmbientMap:
         self._scene = scene
         self._black = scene.sensor.black_level
         self._white = 1.0
+        deep = Deep.of(scene)
+        reach = 0.0 if deep is None else max(kernel.reach(SEQUENCE.glow) for kernel in deep.kernels)
+        self._glow = reach / scene.camera.pixel_pitch  # how far beyond an outline light comes back [px]
         self._sum: NDArray[np.float32] | None = None
         self._levels = np.zeros(scene.camera.shape, np.float32)
         self._added: list[float] = []
@@ -72,7 +78,7 @@ class AmbientMap:
                 self._white = float(white_level(image, self._scene.sensor))
         elif self._sum.shape != image.shape:
             raise InputError(f"sequence: a frame of shape {image.shape} after frames of {self._sum.shape}")
-        margin = SEQUENCE.margin * float(np.max(np.ptp(points, axis=0))) + SEQUENCE.margin_px
+        margin = SEQUENCE.margin * float(np.max(np.ptp(points, axis=0))) + SEQUENCE.margin_px + self._glow
         low = np.floor(points.min(axis=0) - margin).astype(int).clip(0)
         high = np.ceil(points.max(axis=0) + margin).astype(int)
         hidden = (slice(low[1], high[1]), slice(low[0], high[0]))

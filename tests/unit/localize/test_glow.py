@@ -11,6 +11,7 @@ import scipy.fft
 from scipy.ndimage import map_coordinates
 
 from conespot.localize import Knowns, SensorNoise, locate
+from conespot.localize.calibration import NAMES, calibrate
 from conespot.localize.model.deep import Deep
 from conespot.localize.model.estimate import Estimate
 from conespot.localize.model.forward import moved
@@ -156,6 +157,19 @@ def test_a_core_on_a_glow_told_within_a_factor_of_two_is_found_by_its_core(beam)
     off = found.apex_mm - pose.apex
     assert float(np.linalg.norm(off)) < 0.006
     assert off @ np.linalg.solve(found.covariance[:3, :3], off) < 16.0
+
+
+@pytest.mark.slow
+def test_frames_that_glow_calibrate_a_softness():
+    """Three frames, told of the glow within a factor of two and of the softness a tenth off."""
+    scene = scene_of(CyclesBeam(blend=0.9), resolution=500)
+    told = scene_of(CyclesBeam(blend=1.0), resolution=500, spread=Spread(amount=0.7, length=1.4))
+    tips = ((1.0, 0.0, 4.0), (-1.0, 1.5, 3.5), (0.0, -1.5, 5.0))
+    frames = [frame(scene, scene.pose(np.array(tip)), k) for k, tip in enumerate(tips)]
+    found = calibrate(lambda: frames, told, noise=NOISE)
+    at = NAMES.index("softness")
+    assert found.observable["softness"]
+    assert found.values[at] == pytest.approx(0.9, abs=4.0 * found.sigmas[at])
 
 
 def test_a_bound_with_deep_light_is_that_of_a_sixth_of_the_edge():
