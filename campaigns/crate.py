@@ -20,6 +20,7 @@ _MEANS = {
     "errors.parquet": "one row a frame and localizer",
     "makers.json": "what the poses were made with",
     "boxes.csv": "box statistics",
+    "crops.json": "pictures of the worst frames of each box",
     "report.html": "the report",
     "inputs": "a file that the campaign names",
     "tables": "a table of the report",
