@@ -26,8 +26,8 @@ from conespot.results.run import load_run
 from conespot.scene import InputError
 from conespot.scene.atomic import write_atomically
 
-#: frames that are rendered again at most
-MOST_FRAMES = 40
+#: frames that are rendered again at most: where they were asked for, and after a run that nobody asked
+MOST_FRAMES, MOST_UNASKED = 40, 12
 #: a run of fewer rows gets no crops unasked: `campaign debug` draws any of them
 FEWEST_ROWS = 300
 _ERROR = "position_error_mm"
@@ -51,7 +51,7 @@ def keep_crops(folder: Path, per_box: int | None, workers: int) -> None:
     if not goes_on(begun_with):
         raise InputError(f"{folder}: was begun by conespot {begun_with.get('conespot')}, which named cases otherwise")
     plan = make_plan(read_campaign(str(folder / "campaign.yaml")))
-    wanted, left_out = worst_frames(run.rows, asked)
+    wanted, left_out = worst_frames(run.rows, asked, MOST_UNASKED if per_box is None else MOST_FRAMES)
     units = _units(plan, wanted)
     with tempfile.TemporaryDirectory() as temporary:
         pool = LocalPool(workers, functools.partial(make_cropper, wanted))
@@ -65,15 +65,18 @@ def keep_crops(folder: Path, per_box: int | None, workers: int) -> None:
     write_atomically(folder / FILE, kept.model_dump_json().encode())
 
 
-def worst_frames(rows: Rows, per_box: int) -> tuple[Wanted, int]:
-    """The frames with the largest position errors of each box, the worst of all first, and how many are left out."""
+def worst_frames(rows: Rows, per_box: int, most: int) -> tuple[Wanted, int]:
+    """At most so many frames with the largest position errors of each box, the worst of all first, and who is left out.
+
+    The second is how many answers are among the worst too, on frames beyond the `most`.
+    """
     ok = rows.frame[rows.frame["status"] == "ok"].sort_values([_ERROR, "case", "pose"], ascending=[False, True, True])
     worst: pd.DataFrame = ok.groupby(list(rows.group), sort=False).head(per_box)
     wanted: Wanted = {}
     left_out = 0
     for case, pose, localizer in worst[["case", "pose", "localizer"]].itertuples(index=False):
         key = str(case), int(pose)
-        if key in wanted or len(wanted) < MOST_FRAMES:
+        if key in wanted or len(wanted) < most:
             wanted[key] = (*wanted.get(key, ()), str(localizer))
         else:
             left_out += 1
