@@ -14,6 +14,7 @@ from conespot.localize.model.noise import NoiseModel
 from conespot.localize.model.view import outlines
 from conespot.localize.outcome import COMPRESSED, Localization, LocalizationFailure, Outcome
 from conespot.localize.start.search import Start, believed, find_starts
+from conespot.localize.verdict import MISFIT, WRONG_BEAM, WRONG_WALL
 from conespot.scene.pose import Pose
 from conespot.scene.scene import Scene
 from conespot.scene.sensor import Recorded
@@ -21,12 +22,24 @@ from conespot.scene.sensor import Recorded
 
 def answered(frame: Frame, scene: Scene, reference: Reference | None, localized: Callable[[Start], Outcome]) -> Outcome:
     """The one answer of a frame's starts that may be believed, or what speaks against the frame."""
-    outcome = believed(find_starts(frame, scene, reference), scene, localized)
-    if isinstance(outcome, Localization) and not isinstance(scene.sensor, Recorded):
-        estimate = Estimate(Pose(outcome.apex_mm, outcome.axis, outcome.roll or 0.0), scene)
-        points = outlines(estimate)
-        if len(points) and compressed(frame.pixels, *_around(points, scene)):
-            return LocalizationFailure(COMPRESSED)
+    tried: list[Start] = []
+
+    def followed(start: Start) -> Outcome:
+        tried.append(start)
+        return localized(start)
+
+    outcome = believed(find_starts(frame, scene, reference), scene, followed)
+    if isinstance(scene.sensor, Recorded):
+        return outcome
+    if isinstance(outcome, Localization):
+        pose = Pose(outcome.apex_mm, outcome.axis, outcome.roll or 0.0)
+    elif tried and outcome.reason in (MISFIT, WRONG_BEAM, WRONG_WALL):
+        pose = tried[0].pose
+    else:
+        return outcome
+    points = outlines(Estimate(pose, scene))
+    if len(points) and compressed(frame.pixels, *_around(points, scene)):
+        return LocalizationFailure(COMPRESSED)
     return outcome
 
 

@@ -30,11 +30,39 @@ from conespot.localize.model.irradiance import Irradiance, Lights
 from conespot.localize.model.knowns import Knowns
 from conespot.localize.model.noise import NoiseModel
 from conespot.localize.model.prior import prior_rows
-from conespot.localize.model.sight import look
+from conespot.localize.model.sight import Sight, look
 from conespot.localize.model.solve import limited, reduction, solved
+from conespot.localize.model.suspicion import scores as score_tests
+from conespot.localize.model.suspicion import watched
 from conespot.localize.outcome import COVERED, UNCERTAIN, LocalizationFailure
+from conespot.scene.beam import CyclesBeam, HardBeam
 
 Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class Seen:
+    """What a band's bins of `side` px at `pixels` `[N, 2]` see, and the ambient `irradiance` there `[N]`."""
+
+    sight: Sight
+    pixels: Array
+    side: int
+    irradiance: Array
+
+    def lights(self, estimate: Estimate, knowns: Knowns) -> Lights:
+        """The spotlights' irradiance, with derivatives by what is free."""
+        every = np.ones(len(self.pixels), bool)
+        return Irradiance(self.sight, self.pixels, self.side, estimate, knowns, every)(estimate)
+
+    def softer(self, estimate: Estimate) -> Array | None:
+        """How the irradiance changes as a hard edge gets soft `[N]`; None for others, which have a softness."""
+        beam = estimate.scene.beam
+        if not isinstance(beam, HardBeam):
+            return None
+        soft = CyclesBeam(half_angle=beam.half_angle, blend=EDGE.softer)
+        there = Estimate(estimate.pose, estimate.scene.model_copy(update={"beam": soft}))
+        hard, softened = (self.lights(e, Knowns().within(e.scene))[0][0] for e in (estimate, there))
+        return np.asarray((softened - hard) / EDGE.softer)
 
 
 @dataclass(frozen=True)
@@ -54,6 +82,7 @@ class BandFit(EdgeFit):
 
     channels: tuple[Nuisances, ...]
     contradicted: bool  #: whether the band shows what was taken as told to be otherwise
+    seen: Seen
 
     @property
     def gains(self) -> tuple[float, ...]:
@@ -67,10 +96,40 @@ class BandFit(EdgeFit):
 
     def scatter(self) -> Array:
         """Covariance of the gradient `[P, P]` as the strips' residuals show it."""
-        size, strips = len(self.information), self.channels[0].strips
+        scores, parts, known = self._strips(self.channels, self.prior)
+        return score_covariance(self.channels[0].strips, scores, parts) + known
+
+    def suspicions(self, knowns: Knowns) -> dict[str, float]:
+        """Scores of beam and wall where the fit stands, over their sigmas."""
+        wide = watched(knowns, self.estimate.scene)
+        lights, size = self.seen.lights(self.estimate, wide), len(self.information)
+        fixed = [q for q in wide.free if knowns.sigma(q) == 0.0]
+        own = [self.estimate.pose_size + i for i, q in enumerate(wide.free) if q not in fixed]
+        last = [self.estimate.pose_size + i for i, q in enumerate(wide.free) if q in fixed]
+        order, names = [*range(self.estimate.pose_size), *own, *last], [q.name for q in fixed]
+        softer = self.seen.softer(self.estimate)
+        channels = []
+        for c, channel in enumerate(self.channels):
+            light, rows = lights[c]
+            rows = rows[order] if softer is None else np.concatenate([rows[order], softer[None]])
+            channels.append(copy(channel))
+            channels[-1].evaluate(self.seen.irradiance, light, rows)
+        if softer is not None:
+            names.append("edge")
+        prior = np.pad(self.prior, ((0, 0), (0, len(names))))
+        scores, parts, known = self._strips(channels, prior)
+        return score_tests(
+            names, scores.sum(axis=0), parts.sum(axis=0) + prior.T @ prior,
+            score_covariance(self.channels[0].strips, scores, parts) + known, size,
+        )  # fmt: skip
+
+    @staticmethod
+    def _strips(channels: Sequence[Nuisances], prior: Array) -> tuple[Array, Array, Array]:
+        """The strips' gradients `[S, P]` and informations `[S, P, P]`, and the covariance `[P, P]` of the priors'."""
+        size, strips = prior.shape[1], channels[0].strips
         scores, parts = np.zeros((strips.count, size)), np.zeros((strips.count, size, size))
-        known = self.prior.T @ self.prior
-        for channel in self.channels:
+        known = prior.T @ prior
+        for channel in channels:
             gradient, own = channel.scores()
             whole = own.sum(axis=0)
             whole[range(size, len(whole)), range(size, len(whole))] += channel.precision
@@ -78,7 +137,7 @@ class BandFit(EdgeFit):
             known = known + (reduced[:, size:] * channel.precision) @ reduced[:, size:].T
             scores = scores + gradient @ reduced.T / channel.follows
             parts = parts + reduced @ own @ reduced.T
-        return score_covariance(strips, scores, parts) + known
+        return scores, parts, known
 
 
 def fit_band(
@@ -142,10 +201,20 @@ def fit_band(
     if doubted is not None:
         free = replace(doubted, rcm_sigma_mm=used.rcm_sigma_mm)
         # the channels stay as they are
-        seen, prior = [copy(channel) for channel in channels], prior_rows(estimate, nominal, free)
-        own, pull, _ = _equations(seen, irradiance, shed(estimate, free), prior)
+        again, prior = [copy(channel) for channel in channels], prior_rows(estimate, nominal, free)
+        own, pull, _ = _equations(again, irradiance, shed(estimate, free), prior)
         doubt = contradicted(own, pull, estimate, free, knowns)
-    return BandFit(estimate, information, pj, step, band.covered, knowns, tuple(channels), doubt)
+    return BandFit(
+        estimate,
+        information,
+        pj,
+        step,
+        band.covered,
+        knowns,
+        tuple(channels),
+        doubt,
+        Seen(sight, band.pixels, side, irradiance),
+    )
 
 
 def _equations(

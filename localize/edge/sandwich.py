@@ -37,6 +37,10 @@ class EdgeFit(ABC):
     def scatter(self) -> Array:
         """Covariance of the gradient `[P, P]` as the residuals show it, priors included."""
 
+    @abstractmethod
+    def suspicions(self, knowns: Knowns) -> dict[str, float]:
+        """Scores of beam and wall where the fit stands, over their sigmas: see `model.suspicion`."""
+
     @cached_property
     def covariance(self) -> Array:
         """Covariance of the pose and the free quantities `[P, P]`: a sandwich of the two."""

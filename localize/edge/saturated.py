@@ -42,6 +42,10 @@ class SaturatedFit(EdgeFit):
         """The scatter of the strips is their own measure."""
         return 1.0
 
+    def suspicions(self, knowns: Knowns) -> dict[str, float]:
+        """None: which pixels are clipped does not tell."""
+        return {}
+
     def scatter(self) -> Array:
         """Covariance of the gradient `[P, P]` as the strips' residuals show it."""
         size = len(self.information)

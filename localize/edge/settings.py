@@ -75,6 +75,8 @@ class EdgeSettings:
     around: tuple[float, ...] = (2.5, 3.0, 3.5)
     around_points: int = 24
     gain: float = 0.3
+    #: blend of a Cycles beam that a hard edge is compared with where it is doubted: half a pixel wide on small frames
+    softer: float = 0.02
     #: longest step of the tip, in bins, and however small they are [mm]: within it an outline is nearly linear. No
     #: answer changes
     longest_step_bins: float = 3.0

@@ -3,12 +3,13 @@
 import cv2
 import numpy as np
 import pytest
-from photographs import NOISE, photograph, scene_of
+from photographs import NOISE, fundus, photograph, scene_of
 
 from conespot.localize import locate
 from conespot.localize.compression import compressed
 from conespot.localize.outcome import COMPRESSED, NO_LIGHT
 from conespot.localize.start.search import TWO_PLACES
+from conespot.localize.verdict import WRONG_BEAM, WRONG_WALL
 from conespot.scene import InputError
 from conespot.scene.beam import CyclesBeam, HardBeam
 from conespot.scene.sensor import Linear
@@ -57,6 +58,16 @@ def test_two_instruments_are_refused_where_the_scene_has_one(beam):
     one, other = (photograph(scene, scene.pose(np.array(tip)), rays=2) for tip in (HERE, THERE))
     assert locate(one, scene, "photometric", noise=NOISE)
     assert locate(np.maximum(one, other), scene, "photometric", noise=NOISE).reason == TWO_PLACES
+
+
+def test_a_beam_or_a_wall_told_wrongly_is_refused_with_the_reason_and_the_right_one_is_not():
+    scene = scene_of(HardBeam(), resolution=SIDE)
+    image = photograph(scene, scene.pose(np.array(HERE)), fundus(0.2))
+    soft = scene.model_copy(update={"beam": CyclesBeam(blend=0.2)})
+    long = scene.model_copy(update={"surface": scene.surface.model_copy(update={"semi_axes": (1.0, 1.0, 1.08)})})
+    assert locate(image, scene, "cone", noise=NOISE)
+    assert locate(image, soft, "cone", noise=NOISE).reason == WRONG_BEAM
+    assert locate(image, long, "cone", noise=NOISE).reason == WRONG_WALL
 
 
 def test_a_sensor_of_few_bits_is_white_where_they_end_and_rounds_by_their_steps(soft):
