@@ -16,6 +16,7 @@ from pydantic import BeforeValidator, Field, PlainSerializer, model_validator
 from conespot.localize.model.knowns import RCM_SIGMA_MM, Knowns
 from conespot.localize.model.quantity import quantity
 from conespot.scene import Scene
+from conespot.scene.beam import Beam
 from conespot.scene.model import Model, Words
 from conespot.scene.quantity import Angle, Length, format_quantity
 from conespot.scene.retina import Fundus, Spread
@@ -45,8 +46,8 @@ else:
 class Knowledge(Model):
     """Errors (standard deviations of what is told) and sigmas (what a localizer may assume); `free` is not known.
 
-    `rcm` is in mm along each axis, the others are in their own unit. `surface` is what the localizers are told in
-    place of the true one, and so is `blur`, the width of what the camera's lens does not resolve (0 mm: it resolves
+    `rcm` is in mm along each axis, the others are in their own unit. `surface` and `beam` are what the localizers are
+    told in place of the true ones, and so is `blur`, the width of what the camera's lens does not resolve (0 mm: it resolves
     all). Without `spread_told` they are told that no light spreads under the retina; `spread_error` is of the
     logarithms of its amount and of how far it goes. `reference` is how many frames without spotlights they are given,
     averaged; `sequence` from how many of the trajectory's own frames, evenly spread, they learn the same view.
@@ -64,6 +65,7 @@ class Knowledge(Model):
     relief_sigma: Length = Field(0.0, ge=0.0)
     blur: Length | None = Field(None, ge=0.0, le=0.2)
     surface: AnySurface | None = None
+    beam: Beam | None = None
     spread_told: bool = True
     spread_error: float = Field(0.0, ge=0.0, le=2.0)
     reference: int = Field(0, ge=0, le=1000, strict=True)
@@ -113,6 +115,8 @@ class Knowledge(Model):
             update["camera"] = scene.camera.model_copy(update={"height": height})
         if self.surface is not None:
             update["surface"] = self.surface
+        if self.beam is not None:
+            update["beam"] = self.beam
         if isinstance(scene.retina, Fundus) and scene.retina.spread is not None:
             update["retina"] = scene.retina.model_copy(update={"spread": self._spread(scene.retina.spread, rng)})
         told_scene = scene.model_copy(update=update)

@@ -10,6 +10,7 @@ from conespot.campaigns.plan import frame_seed, make_plan, told
 from conespot.campaigns.schema import base, read_campaign, resolved
 from conespot.localize import Knowns
 from conespot.scene import InputError, Scene
+from conespot.scene.beam import CyclesBeam
 from conespot.scene.document import dump
 
 SWEPT = """\
@@ -31,6 +32,14 @@ def campaign(tmp_path):
         return read_campaign(str(tmp_path / "c.yaml"))
 
     return write
+
+
+def test_a_beam_and_a_wall_may_be_told_in_place_of_the_true_ones():
+    wrong = Knowledge(beam={"kind": "cycles", "blend": 0.1}, surface={"semi_axes": [1.0, 1.0, 1.05]})
+    told = wrong.told(Scene(), np.random.default_rng(1))
+    assert told.beam == CyclesBeam(blend=0.1)
+    assert told.surface.semi_axes == (1.0, 1.0, 1.05)
+    assert told.camera == Scene().camera
 
 
 def test_by_default_localizers_are_told_the_true_scene_and_an_rcm_known_to_a_twentieth_of_a_millimetre():

@@ -7,6 +7,8 @@ from photographs import NOISE, fundus, photograph, scene_of
 
 from conespot.localize import locate
 from conespot.localize.compression import compressed
+from conespot.localize.doubt import noise_of
+from conespot.localize.image import Frame
 from conespot.localize.outcome import COMPRESSED, NO_LIGHT
 from conespot.localize.start.search import TWO_PLACES
 from conespot.localize.verdict import WRONG_BEAM, WRONG_WALL
@@ -76,9 +78,9 @@ def test_a_sensor_of_few_bits_is_white_where_they_end_and_rounds_by_their_steps(
     with pytest.raises(InputError, match="whose white is 31"):
         locate((image >> 4).astype(np.uint8), four)
     found = locate(np.round(image / 4095 * 31).astype(np.uint8), four, "photometric")
-    fine = locate(image, scene, "photometric")
     assert off_um(found) < 6e3 * np.sqrt(np.trace(found.covariance[:3, :3]))
-    assert np.trace(found.covariance[:3, :3]) > np.trace(fine.covariance[:3, :3])
+    eight = np.round(image / 4095 * 255).astype(np.uint8)
+    assert [noise_of(Frame(each, scene.sensor), None).levels for each in (image, eight)] == [4095, 255]
 
 
 @pytest.mark.parametrize("name", ["paper", "paper-code", "paper-code-float"])
