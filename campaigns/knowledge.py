@@ -47,8 +47,8 @@ class Knowledge(Model):
     """Errors (standard deviations of what is told) and sigmas (what a localizer may assume); `free` is not known.
 
     `rcm` is in mm along each axis, the others are in their own unit. `surface` and `beam` are what the localizers are
-    told in place of the true ones, and so is `blur`, the width of what the camera's lens does not resolve (0 mm: it resolves
-    all). Without `spread_told` they are told that no light spreads under the retina; `spread_error` is of the
+    told in place of the true ones, and so is `blur`, the width of what the camera's lens does not resolve (0 mm: it
+    resolves all). Without `spread_told` they are told that no light spreads under the retina; `spread_error` is of the
     logarithms of its amount and of how far it goes. `reference` is how many frames without spotlights they are given,
     averaged; `sequence` from how many of the trajectory's own frames, evenly spread, they learn the same view.
     """
