@@ -6,7 +6,7 @@ import argparse
 from collections.abc import Callable
 from pathlib import Path
 
-from conespot.campaigns import authoring, new_microscope, other_methods, subcommands
+from conespot.campaigns import authoring, following, new_microscope, other_methods, subcommands
 from conespot.campaigns.ending import Ending
 from conespot.campaigns.examples import epilog
 from conespot.campaigns.machines import add_machines, add_workers, few
@@ -125,29 +125,41 @@ def _add_runs(add: _Add) -> None:
     add_workers(report)
 
 
+def _add_frames(command: argparse.ArgumentParser) -> None:
+    """What finds the needle in frames, and where answers go."""
+    command.add_argument("frames", type=Path, nargs="+", metavar="FRAMES", help="images, folders of images, videos")
+    command.add_argument("--scene", required=True, help="the YAML file that describes the microscope, or a preset")
+    command.add_argument("--localizer", default="cone", metavar="NAME", help="what finds the needle (default: cone)")
+    command.add_argument("--reference", type=Path, nargs="+", metavar="FRAMES", help="frames without spotlights")
+    command.add_argument("--csv", type=Path, metavar="FILE", help="write a row for each frame")
+    command.add_argument("--json", type=Path, metavar="FILE", help="write the same with covariances")
+    command.add_argument("--tum", type=Path, metavar="FILE", help="write a TUM trajectory")
+    command.add_argument("--mcap", type=Path, metavar="FILE", help="write poses and frames as ROS 2 records them")
+    command.add_argument("--rate", metavar="HZ", help="frames a second, such as '60 Hz', where they have no times")
+    command.add_argument("--overlay", type=Path, metavar="FOLDER", help="draw what was seen in each frame")
+    alarm = "say which tips are safe: farther from the wall than this, such as '0.1 mm' (research, no safety device)"
+    command.add_argument("--alarm", metavar="DISTANCE", help=alarm)
+    chance = "chance that a tip called safe is not, by the stated sigma (default: 0.001)"
+    command.add_argument("--false-safe", type=float, default=1e-3, metavar="P", help=chance)
+
+
 def _add_own(add: _Add) -> None:
     """What takes frames of one's own camera."""
     localize = add(subcommands.localize, "find the needle in images, folders and videos of your own microscope")
-    localize.add_argument("frames", type=Path, nargs="+", metavar="FRAMES", help="images, folders of images, videos")
-    localize.add_argument("--scene", required=True, help="the YAML file that describes the microscope, or a preset")
-    localize.add_argument("--localizer", default="cone", metavar="NAME", help="what finds the needle (default: cone)")
-    localize.add_argument("--reference", type=Path, nargs="+", metavar="FRAMES", help="frames without spotlights")
-    localize.add_argument("--csv", type=Path, metavar="FILE", help="write a row for each frame")
-    localize.add_argument("--json", type=Path, metavar="FILE", help="write the same with covariances")
-    localize.add_argument("--tum", type=Path, metavar="FILE", help="write a TUM trajectory")
-    localize.add_argument("--mcap", type=Path, metavar="FILE", help="write poses and frames as ROS 2 records them")
-    localize.add_argument("--rate", metavar="HZ", help="frames a second, such as '60 Hz', where they have no times")
-    localize.add_argument("--overlay", type=Path, metavar="FOLDER", help="draw what was seen in each frame")
-    alarm = "say which tips are safe: farther from the wall than this, such as '0.1 mm' (research, no safety device)"
-    localize.add_argument("--alarm", metavar="DISTANCE", help=alarm)
-    chance = "chance that a tip called safe is not, by the stated sigma (default: 0.001)"
-    localize.add_argument("--false-safe", type=float, default=1e-3, metavar="P", help=chance)
+    track = add(following.track, "follow the needle through a video, a recording or a folder of frames in order")
+    for command in (localize, track):
+        _add_frames(command)
+    live = "drop the frames that come while the tracker is busy, as a camera would; else none is dropped"
+    track.add_argument("--live", action="store_true", help=live)
+    lag = "smooth each pose with as many frames after it (without --overlay and --mcap)"
+    track.add_argument("--smooth", type=int, default=0, metavar="FRAMES", choices=range(1, 101), help=lag)
     calibrate = add(subcommands.calibrate, "find out of a sequence what it shows of your microscope and the eye")
     calibrate.add_argument("frames", type=Path, nargs="+", metavar="FRAMES", help="images, folders of images, videos")
     calibrate.add_argument("--scene", required=True, help="the YAML file that describes the microscope so far")
     calibrate.add_argument("--out", type=Path, required=True, metavar="FILE", help="the scene's file to write")
     calibrate.add_argument("--shape", action="store_true", help="find the retina's semi-axes in place of its radius")
     add_set(localize)
+    add_set(track)
     add_set(calibrate)
 
 

@@ -30,6 +30,9 @@ EXAMPLES: dict[str, tuple[str, ...]] = {
     "merge": ("campaign run mine.yaml --shard 2/2", "campaign merge runs/whole runs/mine-1-of-2 runs/mine-2-of-2"),
     "check": ("campaign run theory", "campaign check runs/theory"),
     "localize": ("campaign localize runs/mine/frames/*.png --scene paper-code --set scene.camera.resolution=400",),
+    "track": (
+        "campaign track runs/mine/frames/*.png --scene paper-code --set scene.camera.resolution=400 --rate '60 Hz'",
+    ),
     "calibrate": (
         "campaign calibrate runs/mine/frames --scene paper-code --set scene.camera.resolution=400 --out seen.yaml",
     ),

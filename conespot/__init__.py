@@ -18,6 +18,7 @@ if TYPE_CHECKING:
     from conespot.localize.outcome import Localization, LocalizationFailure
     from conespot.localize.sequence import locate_sequence
     from conespot.localize.together import locate_together
+    from conespot.localize.tracking.tracker import Tracker
     from conespot.render.exposure import Exposure
     from conespot.render.renderer import Renderer
     from conespot.results.run import load_run
@@ -38,6 +39,7 @@ _HOMES = {
     "Renderer": "render.renderer",
     "Scene": "scene.scene",
     "SensorNoise": "localize.model.noise",
+    "Tracker": "localize.tracking.tracker",
     "calibrate": "localize.calibration",
     "load_run": "results.run",
     "load_scene": "scene.scene",
@@ -60,6 +62,7 @@ __all__ = [
     "Renderer",
     "Scene",
     "SensorNoise",
+    "Tracker",
     "calibrate",
     "load_run",
     "load_scene",

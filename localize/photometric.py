@@ -35,15 +35,21 @@ def photometric(
     sensor = noise_of(frame, noise)
 
     def localized(start: Start) -> Outcome:
-        estimate = Estimate(start.pose, scene)
-        if is_sharp(scene) or is_clipped(frame, estimate):
-            return edge_outcome(frame, estimate, known, sensor, reference)
-        fit = fit_patch(frame, estimate, known, sensor, reference)
-        if isinstance(fit, LocalizationFailure):
-            return fit
-        return judged(
-            fit.estimate, inverse(fit.information), scene, fit.knowns,
-            misfit=fit.misfit, covered=fit.lit_share, settled=fit.settled,
-        )  # fmt: skip
+        return patch_outcome(frame, Estimate(start.pose, scene), known, sensor, reference)
 
     return answered(frame, scene, reference, localized)
+
+
+def patch_outcome(
+    frame: Frame, start: Estimate, knowns: Knowns, noise: NoiseModel, reference: Reference | None = None
+) -> Outcome:
+    """The localization from every pixel of the patch near a start, or why it may not be believed."""
+    if is_sharp(start.scene) or is_clipped(frame, start):
+        return edge_outcome(frame, start, knowns, noise, reference)
+    fit = fit_patch(frame, start, knowns, noise, reference)
+    if isinstance(fit, LocalizationFailure):
+        return fit
+    return judged(
+        fit.estimate, inverse(fit.information), start.scene, fit.knowns,
+        misfit=fit.misfit, covered=fit.lit_share, settled=fit.settled,
+    )  # fmt: skip

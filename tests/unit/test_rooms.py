@@ -27,6 +27,8 @@ INNER_ROOMS = {
     "field": {"model"},
     "theory": {"model"},
     "frames": set(),
+    # follows with the fits of the localizers, and searches as they do
+    "tracking": {"model", "cone", "photometric", "locate", "distance"},
 }
 
 

@@ -1,0 +1,61 @@
+"""`campaign track`: frames in, a trajectory out; late frames are dropped live and never in a replay."""
+
+import cv2
+import numpy as np
+import pytest
+from moving import MovingNeedle
+
+from conespot.campaigns import own_track
+from conespot.campaigns.command import main
+from conespot.campaigns.own_track import OwnTrack
+from conespot.localize.outcome import LocalizationFailure
+from conespot.localize.tracking.tracker import State, Tracked
+from conespot.scene.document import dump
+
+
+@pytest.fixture(scope="module")
+def film(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("film")
+    needle = MovingNeedle(300)
+    (folder / "scene.yaml").write_text(dump(needle.scene))
+    (folder / "frames").mkdir()
+    for k in range(4):
+        cv2.imwrite(str(folder / "frames" / f"f{k}.png"), needle.frame(k / needle.rate_hz))
+    return folder
+
+
+def test_a_replay_writes_the_same_trajectory_again_and_smooths_it(film, tmp_path, capsys, monkeypatch):
+    monkeypatch.chdir(film)
+    options = ["track", "frames", "--scene", "scene.yaml", "--rate", "120 Hz"]
+    for name, more in (("a", []), ("b", []), ("s", ["--smooth", "3"])):
+        assert main([*options, *more, "--tum", str(tmp_path / name)]) == 0
+    assert "4 frames: 3 followed, 1 found; " in capsys.readouterr().out
+    first, again, smooth = ((tmp_path / name).read_bytes() for name in "abs")
+    assert first == again != smooth
+    assert len(first.splitlines()) == len(smooth.splitlines()) == 5
+
+
+def test_frames_that_others_overtake_are_dropped_live_and_counted(film, monkeypatch):
+    """A tracker that takes 2.5 frames' time for each: of four frames it gets the first and the newest one then."""
+
+    class Slow:
+        knowns = None
+
+        def __init__(self, *_, **__):
+            pass
+
+        def track(self, image, time_s):
+            return Tracked(time_s, State.LOST, LocalizationFailure("slow"), None, 2.5 / 120.0)
+
+    monkeypatch.setattr(own_track, "Tracker", Slow)
+    for live, times, dropped in ((True, [0.0, 2.0], 1), (False, [0.0, 1.0, 2.0, 3.0], 0)):
+        own = OwnTrack(str(film / "scene.yaml"), [], "cone", 120.0, live=live)
+        list(own.answers([film / "frames"], None))
+        assert np.round([tracked.time_s * 120.0 for tracked in own.tracked][: len(times)], 9).tolist() == times
+        assert own.dropped == dropped
+
+
+def test_frames_without_times_are_refused_with_the_remedy(film, monkeypatch, capsys):
+    monkeypatch.chdir(film)
+    assert main(["track", "frames", "--scene", "scene.yaml"]) == 2
+    assert "has no time stamp, which tracking needs; give --rate, as '60 Hz'" in capsys.readouterr().err
