@@ -38,7 +38,7 @@ class VerdictSettings:
     largest_sigma_mm: float = 0.15
     largest_free_sigma_mm: float = 0.06
     #: largest score over its sigma of a quantity that was told. On ten right scenes with hard edges the largest is 1.3,
-    #: on eight with soft ones under `cone` 4.3; beams a tenth softer have 11, ellipsoids 5 % longer 12 (hard)
+    #: on eight with soft ones under `cone` 4.3; beams told a tenth softer have 11
     suspicious: float = 6.0
     #: largest rms residual over the model's, single ones counted to 5 at most
     largest_misfit: float = 2.5
