@@ -2,8 +2,9 @@
 
 import numpy as np
 
-from conespot.localize.model.forward import ambient_irradiance, light, look, window
+from conespot.localize.model.forward import ambient_irradiance, light
 from conespot.localize.model.profile import Profile
+from conespot.localize.model.sight import look, window
 from conespot.scene import Pose, Scene
 from conespot.scene.camera import Camera
 from conespot.scene.motion import Tremor
@@ -41,7 +42,7 @@ class MovingNeedle:
                 rows, columns = self._reached(pose)
                 size = self.scene.camera.resolution
                 at = (np.arange(size * size).reshape(size, size)[rows, columns]).ravel()
-                sight = type(self._sight)(*(part[at] for part in vars(self._sight).values()))
+                sight = self._sight.part(at)
                 shone = light(sight, pose, self.scene, Profile.of(self.scene.beam))
                 signal[at] += np.nan_to_num(shone.value) * 3.0 / INSTANTS
         size = self.scene.camera.resolution
