@@ -249,6 +249,12 @@ def test_a_campaign_that_names_a_file_outside_is_refused(packed):
             )
 
 
+def test_a_campaign_that_this_version_cannot_read_is_refused_with_its_place_in_the_archive(packed):
+    edit = lambda f: f.update({"campaign.yaml": b"newer: 1\n" + f["campaign.yaml"]})  # noqa: E731
+    with pytest.raises(InputError, match=r"run\.zip, campaign\.yaml:1: newer: unknown key"):
+        verify(changed(packed, edit), 0, 1, Truth())
+
+
 def test_a_campaign_that_is_another_one_than_it_states_is_refused(packed):
     edit = lambda f: f.update({"campaign.yaml": f["campaign.yaml"].replace(b"seed: 1", b"seed: 2")})  # noqa: E731
     with pytest.raises(InputError, match="is not the one that it states"):
