@@ -57,7 +57,7 @@ _RC: Any = {
     "legend.frameon": False,
     "legend.fontsize": 8.5,
     "svg.hashsalt": "conespot",
-    "pdf.fonttype": 42,  # text that can be searched and edited
+    "pdf.fonttype": 3,  # TrueType is made into subsets first, which takes longer than drawing
     "path.simplify": True,
 }
 _DPI = 150
