@@ -13,7 +13,7 @@ from conespot.scene.scene import Scene
 
 Array = NDArray[np.float64]
 #: the search for the nearest point begins with directions this far apart on the wall [mm]: bumps are wider
-_APART_MM = 0.1
+_APART_MM = 0.2
 _FEWEST, _MOST = 15, 61  # of them along a side
 _SIDE, _NARROWED = 9, 3  # when it is narrowed, and how often
 #: Newton steps then, and the least step of its differences [rad]: less would be lost in rounding
