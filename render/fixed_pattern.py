@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 from dataclasses import dataclass
 
 import numpy as np
@@ -13,17 +14,20 @@ Plane = NDArray[np.float32]
 #: the second half of the streams' key, which keeps them apart from those of the frames' noise
 _KEY = 1288
 _PIXELS, _ROWS, _COLUMNS, _DEFECTS = range(4)
+#: crops kept for the next frame: the readout's bands of a video frame of 2160 lines (100 MB), or of 1080 (25 MB)
+_KEPT = 17
 
 
 @dataclass(frozen=True, eq=False)
 class Unevenness:
-    """What a fixed pattern does to pixels `[h, w]`."""
+    """What a fixed pattern does to pixels `[h, w]`; nobody may write to it, since other frames share it."""
 
     response: Plane  #: electrons over those of an even sensor in the same light
     offset: Plane  #: electrons added
     dark_current: Plane  #: added to the sensor's [e-/s]
 
 
+@functools.lru_cache(maxsize=_KEPT)
 def unevenness(pattern: FixedPattern, row: int, column: int, shape: tuple[int, int]) -> Unevenness:
     """That of a crop of `shape` = (h, w) whose first pixel is (row, column) of the frame."""
     height, width = shape
@@ -41,7 +45,10 @@ def unevenness(pattern: FixedPattern, row: int, column: int, shape: tuple[int, i
     response = np.maximum(1.0 + summed(0, prnu.pixel, prnu.row, prnu.column), np.float32(0.0))
     response[defects >= 1.0 - pattern.dead] = 0.0
     hot = np.where(defects < pattern.hot, np.float32(pattern.hot_current), np.float32(0.0))
-    return Unevenness(response, summed(1, dsnu.pixel, dsnu.row, dsnu.column), hot)
+    planes = response, summed(1, dsnu.pixel, dsnu.row, dsnu.column), hot
+    for plane in planes:
+        plane.flags.writeable = False
+    return Unevenness(*planes)
 
 
 def _stream(pattern: FixedPattern, kind: int, row: int) -> np.random.Generator:

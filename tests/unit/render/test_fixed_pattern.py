@@ -84,3 +84,12 @@ def test_without_a_pattern_nothing_changes() -> None:
     even = CAMERA.model_copy(update={"fixed_pattern": FixedPattern()})
     none = CAMERA.model_copy(update={"fixed_pattern": None})
     np.testing.assert_array_equal(expose(signal, even, 5), expose(signal, none, 5))
+
+
+def test_a_pattern_is_drawn_once_and_nobody_can_change_it_for_the_frames_to_come():
+    """The same crop of an equal sensor, asked for twice."""
+    first = unevenness(PATTERN, 0, 0, (8, 9))
+    assert unevenness(PATTERN.model_copy(), 0, 0, (8, 9)) is first
+    for plane in (first.response, first.offset, first.dark_current):
+        with pytest.raises(ValueError, match="read-only"):
+            plane += 1.0
