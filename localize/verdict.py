@@ -69,8 +69,8 @@ def judged(
     """The localization, or why there is none.
 
     `covariance` `[P, P]` is of the pose and the free quantities, infinite if there is none. `misfit` is the rms
-    residual over the model's, `covered` the share seen, `suspicions`
-    are scores of what the scene says, over their sigmas (`model.suspicion`).
+    residual over the model's, `covered` the share seen, `suspicions` are scores of what the scene says, over their
+    sigmas (`model.suspicion`).
     """
     if covered < VERDICT.least_covered:
         return LocalizationFailure(COVERED)

@@ -21,6 +21,10 @@ from conespot.scene.scene import Scene
 Array = NDArray[np.float64]
 #: share of a quantity's information that pose and free quantities must leave it: rounding alone is in the rest
 _LEFT = 1e-9
+#: what each would have to be off by to count, and could be at most [rad, 1, mm, 1]. Nobody knows a lamp's softness to a
+#: hundredth; what would have to be off by more than is possible hardly shows in the frame, and something else is amiss,
+#: such as the foot of a soft edge below the sensor's last level
+_MATERIAL = {"half_angle": (2e-4, 0.05), "softness": (0.01, 1.0), "eye_radius": (0.02, 3.0), "edge": (0.01, 1.0)}
 
 
 def watched(knowns: Knowns, scene: Scene) -> Knowns:
@@ -35,7 +39,7 @@ def watched(knowns: Knowns, scene: Scene) -> Knowns:
 
 
 def scores(names: list[str], gradient: Array, information: Array, scatter: Array, size: int) -> dict[str, float]:
-    """Each of the last parameters' scores over its own sigma, the first `size` taken out.
+    """Each of the last parameters' scores over its own sigma, the first `size` taken out; of those that matter.
 
     `gradient` `[P]`, `information` `[P, P]` and the gradient's covariance `scatter` `[P, P]` are where a fit stands.
     """
@@ -47,5 +51,5 @@ def scores(names: list[str], gradient: Array, information: Array, scatter: Array
     return {
         name: float(s) / math.sqrt(float(v))
         for name, s, v, part, all_of_it in zip(names, score, variance, left, whole, strict=True)
-        if v > 0.0 and part > _LEFT * all_of_it
+        if v > 0.0 and part > _LEFT * all_of_it and _MATERIAL[name][0] < abs(s) / part < _MATERIAL[name][1]
     }

@@ -108,6 +108,11 @@ def said(table, line):
     return itertools.product(*(w.split(" or ") if table.name == "expectations" else [w] for w in words))
 
 
+def stated(block):
+    """All that a block says its numbers assume, in its notes or, with what others assume alike, in its table's."""
+    return " ".join([*block.notes, block.assumes.sentence() if block.assumes is not None else ""])
+
+
 def judged(run):
     """What the lines are called that each expectation is about which the run can be judged by, beside the localizer."""
     verdicts = check(run, expected(run.document))
@@ -139,9 +144,11 @@ def test_every_block_names_what_each_of_its_cases_assumes(written):
     plan, run, boxes = written
     tables = [table for table in make_tables(run, boxes) if table.name != "table_1"]
     for table in tables:
-        assert all("power convention: " in "".join(block.notes) for block in table.blocks)
+        assert all("power convention: " in stated(block) for block in table.blocks)
+        # what all blocks assume alike is written once
+        assert all(f"{words}" in " ".join(table.text().split()) for words in table.shared.values())
         assert "not stated" not in table.text()
-    said = [note for table in tables for block in table.blocks for note in block.notes]
+    said = [stated(block) for table in tables for block in table.blocks]
     for scene in (case.scene for case in plan.cases):
         words = (scene.power.words, scene.beam.words, scene.surface.words, scene.sensor.words)
         assert any(all(word in note for word in words) for note in said), words

@@ -163,7 +163,7 @@ def test_the_same_rows_give_the_same_bytes(tmp_path, plan, make_rows):
         (tmp_path / name).mkdir()
         written.append([path.read_bytes() for path in draw_figures(drawings, tmp_path / name)])
     assert written[0] == written[1]
-    assert len(written[0]) == 4
+    assert len(written[0]) == 6
     svg = next(data for data in written[0] if b"<svg" in data)
     assert b"<dc:date>" not in svg
     assert ET.fromstring(svg).tag.endswith("svg")
@@ -195,7 +195,7 @@ def test_hostile_names_are_drawn_as_text_and_nothing_else(tmp_path, plan, make_r
     (drawing,) = plan(frame)
     with warnings.catch_warnings():
         warnings.simplefilter("error")
-        _, svg = draw_figures([drawing], tmp_path)
+        _, svg, _ = draw_figures([drawing], tmp_path)
     assert svg.parent == tmp_path
     assert ET.parse(svg).getroot().tag.endswith("svg")
 
@@ -205,7 +205,7 @@ def test_a_single_pose_or_only_failures_can_be_drawn(tmp_path, plan, make_rows, 
     drawings = plan(make_rows(poses=1, powers=(0.25, 1.0), trajectories=("box",), rigs=("single",), failing=failing))
     with warnings.catch_warnings():
         warnings.simplefilter("error")
-        assert len(draw_figures(drawings, tmp_path)) == 4
+        assert len(draw_figures(drawings, tmp_path)) == 6
 
 
 def test_the_users_matplotlib_is_left_as_it_was(make_rows):
