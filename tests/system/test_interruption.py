@@ -13,7 +13,7 @@ import pytest
 
 #: the command, but for what measures a pose, and for rows that may take long to write
 COMMAND = """\
-import functools, os, sys, time
+import os, sys, time
 from pathlib import Path
 from conespot.campaigns.command import main
 from conespot.campaigns.row import Finding, Record
@@ -33,7 +33,11 @@ def make(plan, frames):
 
 if __name__ == "__main__":
     from conespot.campaigns import pool, store
-    pool.LocalPool = functools.partial(pool.LocalPool, make=make)
+    class Pool(pool.LocalPool):
+        def __init__(self, workers):
+            super().__init__(workers, make)
+
+    pool.LocalPool = Pool
     if "ROWS_S" in os.environ:
         store.Store.write_rows = lambda self: (Path("writes").touch(), time.sleep(float(os.environ["ROWS_S"])))
     sys.exit(main())
