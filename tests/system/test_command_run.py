@@ -66,6 +66,7 @@ def test_a_run_writes_rows_tables_and_a_report(straight):
     assert "straight: errors.csv, errors.parquet" in done.stdout
 
 
+@pytest.mark.slow
 def test_two_workers_give_the_same_bytes(folder, straight):
     done = campaign("run", "c.yaml", "--workers", 2, "--out", "two", cwd=folder)
     assert done.returncode == 0, done.stderr

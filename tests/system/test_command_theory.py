@@ -8,6 +8,7 @@ import pytest
 
 from conespot.campaigns.command import main
 
+pytestmark = pytest.mark.slow
 CAMPAIGN = [sys.executable, "-m", "conespot"]
 FILES = {"table_1.csv", "bounds.csv", "budget.csv", "design.csv", "theory.txt"}
 FILES |= {f"{name}.{kind}" for name in ("budget", "design") for kind in ("png", "svg", "pdf")}

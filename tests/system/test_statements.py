@@ -49,7 +49,12 @@ def answered(group, pose):
     return Record(unit=group.unit(pose), findings=tuple(findings))
 
 
-@pytest.fixture(scope="module", params=["the page", *CAMPAIGNS])
+#: those that are told apart by what no other is: the others are read where there is more time
+QUICK = ("deformation", "power_sweep", "reality")
+EACH = [pytest.param(name, marks=() if name in QUICK else pytest.mark.slow) for name in CAMPAIGNS]
+
+
+@pytest.fixture(scope="module", params=["the page", *EACH])
 def written(request, tmp_path_factory):
     """The plan of a campaign, its run, and the boxes of that."""
     folder = tmp_path_factory.mktemp("run")

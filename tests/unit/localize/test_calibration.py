@@ -23,6 +23,7 @@ def test_calibration_finds_the_half_angle_of_a_rig_and_says_that_the_size_of_the
     assert "camera_height: not observable" in found.statement()
 
 
+@pytest.mark.slow
 def test_calibration_finds_the_softness_of_the_edge_over_a_texture_and_states_an_honest_sigma():
     """A blend of 0.3 believed to be 0.35, eight frames over a fundus' texture; within 4 sigmas, and to 0.02."""
     true = scene_of(CyclesBeam(blend=0.3))

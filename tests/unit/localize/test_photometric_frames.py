@@ -96,6 +96,7 @@ def test_the_mean_of_many_reference_frames_makes_a_hard_patch_on_coarse_texture_
     assert np.trace(found.covariance[:3, :3]) < 0.8 * np.trace(alone.covariance[:3, :3])
 
 
+@pytest.mark.slow
 def test_soft_ellipsoids_on_texture_hold_what_they_state():
     scene, rng = scene_of(CyclesBeam()), np.random.default_rng(8)
     squares = []
