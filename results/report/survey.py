@@ -59,6 +59,8 @@ def _lines(run: Run, places: pd.Series, x: str, said: Callable[[str], str]) -> t
 def _boxes(rows: pd.DataFrame) -> pd.DataFrame:
     """Median, quartiles and counts by place, along the axis."""
     ok = rows[(rows["status"] == "ok") & (rows["place"] > 0.0)]
+    if ok.empty:
+        return pd.DataFrame()
     found = ok.groupby("place")[_ERROR].quantile(np.array([0.25, 0.5, 0.75])).unstack()
     found = found.assign(n=ok.groupby("place").size(), of=rows.groupby("place").size())
     return found.iloc[:: max(1, -(-len(found) // _MOST_POINTS))]

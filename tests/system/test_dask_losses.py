@@ -94,7 +94,8 @@ def test_a_worker_that_leaks_is_replaced_by_its_nanny_and_costs_no_pose(plan, tm
     assert errors == {}
     assert len([note for note in notes if note.startswith("a worker was lost")]) == 1
     # whoever had the batch is gone, and nobody did more than what was left of it again
-    assert len({name.name.split("-")[1] for name in tmp_path.glob("did-*")}) == 3
+    # (of two workers one may have done nothing yet, on a busy machine)
+    assert len({name.name.split("-")[1] for name in tmp_path.glob("did-*")}) in (2, 3)
 
 
 class Scheduling:
