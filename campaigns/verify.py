@@ -18,12 +18,14 @@ import pandas as pd
 from conespot.campaigns import crate
 from conespot.campaigns.archive import Archive
 from conespot.campaigns.executor import Executor
+from conespot.campaigns.frame_names import FILE as EXPORTED
 from conespot.campaigns.journal import FILE as JOURNAL
 from conespot.campaigns.maker import items
 from conespot.campaigns.pack import INPUTS, with_files
 from conespot.campaigns.plan import Plan, Unit, make_plan
 from conespot.campaigns.row import Finding, Record
 from conespot.campaigns.schema import read_campaign
+from conespot.campaigns.scores import FOLDER as SCORES
 from conespot.campaigns.store import Store, look_into
 from conespot.results.rows import read_rows
 from conespot.scene import InputError
@@ -36,7 +38,8 @@ _SAME_PROGRAM_MM = 1e-9
 SAME_VARIANT_MM, OTHER_VARIANT_MM = 0.005, 0.3
 #: rows that follow from a journal by arithmetic alone, which differs in the last digits between machines
 _ROUNDING = 1e-6
-_NEEDED = ("campaign.yaml", JOURNAL, "cases.jsonl", "errors.csv", "errors.parquet")
+#: rows follow from the journal, and those of other methods from their scores, which name exported frames
+_NEEDED = ("campaign.yaml", JOURNAL, "cases.jsonl", "errors.csv", "errors.parquet", EXPORTED)
 _MOST_NAMED = 5
 
 
@@ -65,8 +68,8 @@ def verify(path: Path, sample: int, seed: int | None, executor: Executor) -> Ver
         raise InputError(f"{path}: holds no {', '.join(missing)}; it is no run that `campaign pack` packed")
     with tempfile.TemporaryDirectory(prefix="conespot-") as unpacked:
         folder = Path(unpacked)
-        inputs = (name for name in archive.entries if name.startswith(f"{INPUTS}/"))
-        archive.unpack((name for name in (*_NEEDED, *inputs) if name in archive.entries), folder)
+        beside = (name for name in archive.entries if name.startswith((f"{INPUTS}/", f"{SCORES}/")))
+        archive.unpack((name for name in (*_NEEDED, *beside) if name in archive.entries), folder)
         plan = _plan(path, folder)
         with look_into(folder, plan) as store:
             verdict.wrong += [sentence.replace(f"{folder}/", "") for sentence in store.damage]
@@ -100,15 +103,12 @@ def _plan(path: Path, folder: Path) -> Plan:
 def _compare_rows(folder: Path, store: Store, verdict: Verdict) -> None:
     """Whether the rows follow from the journal."""
     expected = store.rows()
-    own = {name for case in store.plan.cases for name in case.localizers}
     for name in ("errors.csv", "errors.parquet"):
         if not (folder / name).is_file():
             if len(expected):
                 verdict.wrong.append(f"{name}: is missing, and the journal holds {len(store.entries)} poses")
             continue
         found = read_rows(folder / name, [*store.plan.cases[0].swept]).frame
-        # rows of somebody else's method (campaign score) are in no journal: they follow from a file of estimates
-        found = found[found["localizer"].isin(own)].reset_index(drop=True)
         off = list(differing(expected, found))
         verdict.wrong += [f"{name}: {sentence}" for sentence in off[:_MOST_NAMED]]
         if off[_MOST_NAMED:]:

@@ -11,13 +11,16 @@ from conespot.campaigns.begun import plan_of
 from conespot.campaigns.export import INDEX, _write_index
 from conespot.campaigns.exporter import png
 from conespot.campaigns.frame_names import FILE, FrameNames
+from conespot.campaigns.pack import pack
 from conespot.campaigns.plan import make_plan
+from conespot.campaigns.pool import LocalPool
 from conespot.campaigns.row import Finding, Record
 from conespot.campaigns.schema import read_campaign
 from conespot.campaigns.scores import NO_ESTIMATE, read_score
 from conespot.campaigns.scoring import score
 from conespot.campaigns.session import report
 from conespot.campaigns.store import open_store
+from conespot.campaigns.verify import verify
 from conespot.results import writing
 from conespot.scene import InputError, load_scene
 
@@ -95,6 +98,16 @@ def test_estimates_join_the_rows_and_what_is_refused_left_out_or_lost_is_counted
     assert (run / "journal.jsonl").read_bytes() == journal
     again = pd.read_csv(run / "errors.csv")
     pd.testing.assert_frame_equal(again[again["localizer"] == "paper"].reset_index(drop=True), own)
+
+
+def test_a_packed_run_is_verified_with_its_scores_and_a_row_that_no_estimate_made_is_found(run, names):
+    scored(run, f"frame,x_mm,y_mm,z_mm\n{names[1, 0]},1,1,5\n")
+    pack(run, run.parent / "true.zip")
+    assert verify(run.parent / "true.zip", 0, 1, LocalPool(1)).wrong == []
+    text = (run / "errors.csv").read_text()
+    (run / "errors.csv").write_text(text.replace(",theirs,", ",better,"))
+    pack(run, run.parent / "forged.zip")
+    assert any("errors.csv" in sentence for sentence in verify(run.parent / "forged.zip", 0, 1, LocalPool(1)).wrong)
 
 
 def test_a_score_survives_a_report_is_replaced_by_its_name_and_goes_with_its_file(run, names):
