@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-import os
 import re
 from collections.abc import Iterator, Mapping
 from pathlib import Path
 
-from conespot.campaigns.questions import Question
+from conespot.campaigns.questions import Question, write_answered
 
 #: the answer that leaves a key as the preset has it
 KEPT = "preset"
@@ -109,17 +108,8 @@ def write_campaign(path: Path, answers: Mapping[str, str]) -> int:
     Raises InputError, with nothing written, if the file is there, cannot be written, or the answers do not go together.
     """
     from conespot.campaigns.plan import make_plan
-    from conespot.scene.atomic import write_atomically
-    from conespot.scene.document import Document, InputError, read_value
 
-    if os.path.lexists(path):
-        raise InputError(f"{path}: is there already; name another file")
-    if not path.parent.is_dir():
-        raise InputError(f"{path.parent}: no such folder; make it, or name another file")
-    text = "".join(f"{line}\n" for line in _lines(path, answers))
-    planned = make_plan(Document("these answers", read_value(text, "these answers"), folder=path.parent))
-    write_atomically(path, text.encode(), "file")
-    return planned.rows
+    return write_answered(path, _lines(path, answers), make_plan).rows
 
 
 def _lines(path: Path, answers: Mapping[str, str]) -> Iterator[str]:

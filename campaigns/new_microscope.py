@@ -7,7 +7,7 @@ import os
 from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
 
-from conespot.campaigns.questions import Question
+from conespot.campaigns.questions import Question, write_answered
 
 #: the answer of a question that does not matter here
 NONE = "none"
@@ -133,18 +133,9 @@ def write_microscope(path: Path, answers: Mapping[str, str]) -> None:
 
     Raises InputError, with nothing written, if the file is there, cannot be written, or the answers do not go together.
     """
-    from conespot.scene.atomic import write_atomically
-    from conespot.scene.document import Document, InputError, read_value
     from conespot.scene.scene import read_scene, without_knowledge
 
-    if os.path.lexists(path):
-        raise InputError(f"{path}: is there already; name another file")
-    if not path.parent.is_dir():
-        raise InputError(f"{path.parent}: no such folder; make it, or name another file")
-    text = "".join(f"{line}\n" for line in _lines(path, answers))
-    document = Document("these answers", read_value(text, "these answers"), folder=path.parent)
-    read_scene(without_knowledge(document))
-    write_atomically(path, text.encode(), "file")
+    write_answered(path, _lines(path, answers), lambda document: read_scene(without_knowledge(document)))
 
 
 def _lines(path: Path, answers: Mapping[str, str]) -> Iterator[str]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import difflib
+import os
 import sys
 
 from conespot.campaigns import streams
@@ -11,7 +12,12 @@ TYPE_CHECKING = False  # `typing` takes long to import
 if TYPE_CHECKING:
     import argparse
     from collections.abc import Callable, Iterable, Mapping
+    from pathlib import Path
+    from typing import TypeVar
 
+    from conespot.scene.document import Document
+
+    Read = TypeVar("Read")
     #: an answer as it is written; raises ValueError, saying how to answer instead
     Check = Callable[[str], str]
     #: what is answered by nothing but Enter, or made of the answers so far
@@ -111,3 +117,21 @@ def _asked(question: Question, default: str) -> str:
             return question.understood(line.strip() or default)
         except ValueError as error:
             streams.complain(f"  {error}")
+
+
+def write_answered(path: Path, lines: Iterable[str], read: Callable[[Document], Read]) -> Read:
+    """Write the lines that answers make to a new file; what `read` makes of them, which refuses what is not valid.
+
+    Raises InputError, with nothing written, if the file is there, cannot be written, or the answers do not go together.
+    """
+    from conespot.scene.atomic import write_atomically
+    from conespot.scene.document import Document, InputError, read_value
+
+    if os.path.lexists(path):
+        raise InputError(f"{path}: is there already; name another file")
+    if not path.parent.is_dir():
+        raise InputError(f"{path.parent}: no such folder; make it, or name another file")
+    text = "".join(f"{line}\n" for line in lines)
+    found = read(Document("these answers", read_value(text, "these answers"), folder=path.parent))
+    write_atomically(path, text.encode(), "file")
+    return found
