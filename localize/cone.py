@@ -46,5 +46,5 @@ def edge_outcome(
     return judged(
         fit.estimate, fit.covariance, start.scene, fit.knowns,
         misfit=fit.misfit, covered=fit.covered, settled=fit.settled,
-        suspicions=fit.suspicions(fit.knowns),
+        suspicions=lambda: fit.suspicions(fit.knowns),
     )  # fmt: skip

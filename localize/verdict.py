@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from types import MappingProxyType
 
 import numpy as np
 from numpy.typing import NDArray
@@ -64,13 +63,13 @@ def judged(
     misfit: float,
     covered: float,
     settled: bool,
-    suspicions: Mapping[str, float] = MappingProxyType({}),
+    suspicions: Callable[[], Mapping[str, float]] = dict,
 ) -> Outcome:
     """The localization, or why there is none.
 
     `covariance` `[P, P]` is of the pose and the free quantities, infinite if there is none. `misfit` is the rms
-    residual over the model's, `covered` the share seen, `suspicions` are scores of what the scene says, over their
-    sigmas (`model.suspicion`).
+    residual over the model's, `covered` the share seen, `suspicions` gives scores of what the scene says, over their
+    sigmas (`model.suspicion`), and is asked of a fit that nothing else refuses: it takes as long as a step of one.
     """
     if covered < VERDICT.least_covered:
         return LocalizationFailure(COVERED)
@@ -95,8 +94,9 @@ def judged(
             return LocalizationFailure(MISSES_RCM)
     if misfit > VERDICT.largest_misfit:
         return LocalizationFailure(MISFIT)
-    worst = max(suspicions, key=lambda name: abs(suspicions[name]), default=None)
-    if worst is not None and abs(suspicions[worst]) > VERDICT.suspicious:
+    found = suspicions()
+    worst = max(found, key=lambda name: abs(found[name]), default=None)
+    if worst is not None and abs(found[worst]) > VERDICT.suspicious:
         return LocalizationFailure(WRONG_WALL if worst == "eye_radius" else WRONG_BEAM)
     if not settled:
         return LocalizationFailure(UNSETTLED)
