@@ -36,7 +36,7 @@ EXAMPLES: dict[str, tuple[str, ...]] = {
     "calibrate": (
         "campaign calibrate runs/mine/frames --scene paper-code --set scene.camera.resolution=400 --out seen.yaml",
     ),
-    "theory": ("campaign theory paper-code --set camera.resolution=1000",),
+    "theory": ("campaign theory paper-code --set scene.camera.resolution=1000",),
 }
 
 
