@@ -1,4 +1,8 @@
-"""What a lens does to a picture that is sharp: residual blur, and glare over all of the frame. Both are linear."""
+"""What a lens does to a picture that is sharp: residual blur, and glare over all of the frame. Both are linear.
+
+Weights of whole pixels cannot be a narrow Gaussian: one of half a pixel moves an edge by 0.025 px, according to where
+it lies in its pixel; one of 1.5 px by 0.004. A narrower one is therefore in a patch's rays.
+"""
 
 from __future__ import annotations
 
@@ -23,17 +27,22 @@ Image = NDArray[np.float32]
 _FAR = 5.0
 #: places along a pixel's side at which a profile is read, and fewer where it is wider than so many pixels
 _PLACES, _PLACES_OF_WIDE, _WIDE = 9, 3, 64
+#: a Gaussian below this standard deviation [px] is in the rays
+_NARROW = 1.5
+#: places at which the distribution of a pixel's rays is held
+_QUANTILES = 4097
 
 
 class Blur:
     """The blur and the glare of a camera's lens, for pictures of linear radiance `[h, w, C]`.
 
     A point's light is spread by whole pixels' weights, alike all over the frame, and the sum of the weights is 1. What
-    the frame's border cuts off is as if mirrored there.
+    the frame's border cuts off is as if mirrored there. With `rays`, a narrow Gaussian is left to a patch's rays.
     """
 
-    def __init__(self, camera: Camera) -> None:
+    def __init__(self, camera: Camera, *, rays: bool) -> None:
         self._shape = camera.shape
+        self.in_rays = _in_rays(camera) if rays else None  #: standard deviations (across, down) [px] of what rays do
         self._weights: Array | None = None
         self._glare = 0.0
         if camera.lens is None:
@@ -49,32 +58,38 @@ class Blur:
 
     @property
     def steadiness(self) -> float:
-        """By how much the standard deviation of noise that is each pixel's own falls."""
-        return 1.0 if self._weights is None else float(1.0 / np.sqrt(np.sum(np.square(self._weights))))
+        """By how much the standard deviation of a tile's noise, each pixel's own, falls."""
+        return 1.0 if self._weights is None or self.in_rays else float(1.0 / np.sqrt(np.sum(np.square(self._weights))))
 
     def frame(self, sharp: Image) -> Image:
         """A whole frame `[H, W, C]`, spread."""
-        blurred = self._blurred(sharp)
+        blurred = self.smoothed(sharp)
         mean = np.mean(blurred, axis=(0, 1), dtype=float)
         return np.asarray(blurred * np.float32(1.0 - self._glare) + (self._glare * mean).astype(np.float32))
 
     def tile(self, sharp: Tile) -> Tile:
-        """A tile around which there is no light: larger by the reach of the blur, and with its glare."""
+        """A tile around which there is no light: with its glare, and larger by the reach of a blur not in its rays."""
         if self.is_none or not sharp.radiance.size:
             return sharp
         crop, radiance = sharp.crop, sharp.radiance
-        if self._weights is not None:
+        if self._weights is not None and self.in_rays is None:
             down, right = (side // 2 for side in self._weights.shape)
             crop = crop.grown(down, right, self._shape)
             radiance = np.zeros((crop.height, crop.width, radiance.shape[-1]), np.float32)
             radiance[sharp.crop.within(crop)] = sharp.radiance
-            radiance = self._blurred(radiance)
+            radiance = self.smoothed(radiance)
         if self._glare == 0.0:
             return Tile(crop, radiance)
         glare = self._glare * np.sum(radiance, axis=(0, 1), dtype=float) / math.prod(self._shape)
         return Tile(crop, np.float32(1.0 - self._glare) * radiance, glare.astype(np.float32))
 
-    def _blurred(self, image: Image) -> Image:
+    @property
+    def reach(self) -> int:
+        """How far light is spread by what is in the rays [px]."""
+        return math.ceil(_FAR * max(self.in_rays)) if self.in_rays else 0
+
+    def smoothed(self, image: Image) -> Image:
+        """A picture `[h, w, C]` without edges narrower than a pixel, or any that is not in the rays, without glare."""
         if self._weights is None:
             return image
         image = np.ascontiguousarray(image)
@@ -106,6 +121,27 @@ def weights(spread: PointSpread, width: float, height: float) -> Array:
             return np.ones((1, 1))
         case unknown:
             assert_never(unknown)
+
+
+def _in_rays(camera: Camera) -> tuple[float, float] | None:
+    spread = None if camera.lens is None else camera.lens.blur
+    if not isinstance(spread, GaussianSpread):
+        return None
+    across = spread.sigma / camera.pixel_pitch
+    down = across * camera.pixel_aspect
+    return (across, down) if 0.0 < max(across, down) < _NARROW else None
+
+
+def places(sigma: float) -> Array:
+    """Where the rays of a pixel lie that are spread by `sigma` [px]: quantiles `[n]` from 0 to 1, about its middle."""
+    reach = 0.5 + _FAR * sigma
+    x = np.linspace(-reach, reach, 32 * _QUANTILES)
+
+    def integral(t: Array) -> Array:
+        return np.asarray(t * ndtr(t / sigma) + sigma * np.exp(-((t / sigma) ** 2) / 2.0) / math.sqrt(2.0 * math.pi))
+
+    share = integral(x + 0.5) - integral(x - 0.5)
+    return np.interp(np.linspace(share[0], share[-1], _QUANTILES), share, x)
 
 
 def _gaussian(sigma: float) -> Array:

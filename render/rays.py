@@ -8,11 +8,12 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from conespot.render import kernel
+from conespot.render.blur import places
 from conespot.scene import Camera
 from conespot.scene.distortion import Distortion
 
 if TYPE_CHECKING:
-    from drjit.auto.ad import Bool, Float
+    from drjit.auto.ad import Bool, Float, UInt32
     from mitsuba import Point2f, RayDifferential3f, Spectrum
 
 #: Newton's steps against distortion end where they are this close to the inverse [px]
@@ -25,9 +26,13 @@ class RayGenerator:
     Whatever bends, shifts or delays a ray before it is in the vitreous belongs here, and in `Camera.rays`.
     """
 
-    def __init__(self, camera: Camera, near: float) -> None:
-        """Rays begin `near` [mm] down the camera's axis, or in the vitreous, so that nothing above hides the retina."""
+    def __init__(self, camera: Camera, near: float, blur: tuple[float, float] | None = None) -> None:
+        """Rays begin `near` [mm] down the camera's axis, or in the vitreous, so that nothing above hides the retina.
+
+        Those of a pixel lie all over it, or are spread by a Gaussian's `blur` across and down [px] besides.
+        """
         mi, _, _ = kernel.load()
+        self._places = None if blur is None else [mi.Float(places(sigma)) for sigma in blur]
         focal_length = camera.focal_length_px
         self._middle = _held(camera.principal.tolist())
         self._pixel = _held([1.0 / focal_length, 1.0 / (focal_length * camera.pixel_aspect)])  # at a distance of 1
@@ -44,6 +49,19 @@ class RayGenerator:
     def disperses(self) -> bool:
         """Whether light of each wavelength has a way of its own; then all of a ray's must be alike."""
         return self._optics is not None
+
+    def on_film(self, column: UInt32, row: UInt32, across: Float, down: Float) -> tuple[Float, Float]:
+        """Where on the film (x, y) [px] a pixel's sample lies, by its place (0 to 1) in the pixel's cells."""
+        mi, dr, _ = kernel.load()
+        if self._places is None:
+            return mi.Float(column) + across, mi.Float(row) + down
+        placed = []
+        for table, share in zip(self._places, (across, down), strict=True):
+            step = share * (dr.width(table) - 1)
+            entry = dr.minimum(mi.UInt32(step), dr.width(table) - 2)
+            low, high = dr.gather(mi.Float, table, entry), dr.gather(mi.Float, table, entry + 1)
+            placed.append(dr.lerp(low, high, step - mi.Float(entry)) + 0.5)
+        return mi.Float(column) + placed[0], mi.Float(row) + placed[1]
 
     def rays(
         self, x: Float, y: Float, wavelengths: Spectrum, place: Point2f | None = None

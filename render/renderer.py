@@ -58,11 +58,11 @@ class Renderer:
     ) -> None:
         self.scene = scene
         self.samples, self.edge_samples = samples, edge_samples
-        self._blur = Blur(scene.camera)
         self.noise = monte_carlo.tolerance(scene.sensor.camera) if noise is None else noise
-        self.noise *= self._blur.steadiness  # it is rendered sharp and then spread
         self.rendered = 0  #: tiles and backgrounds rendered so far
         self._mi, _, self._kernel = kernel.load()
+        self._blur = Blur(scene.camera, rays=self._kernel.vectorized)
+        self.noise *= self._blur.steadiness  # it is rendered sharp and then spread
         self._shaft = scene.instrument.shaft
         self._responses = responses
         self._source = Source.of(scene)
@@ -105,6 +105,8 @@ class Renderer:
         if camera.optics is not None and not np.isfinite(rim).all():
             crop = Crop.whole(camera.shape)
         radiance = self._lit.glowing(crop, self._lit.glow.deep.spotlight(pose, spotlight))
+        if self._blur.in_rays:
+            radiance = self._blur.smoothed(radiance)
         row, column = patch.crop.row - crop.row, patch.crop.column - crop.column
         radiance[row : row + patch.crop.height, column : column + patch.crop.width] += patch.radiance
         return Tile(crop, radiance)
@@ -119,7 +121,7 @@ class Renderer:
         pixels = crop.pixels(self.scene.camera.shape[1])
         # the few samples of a pixel that the edge barely enters may all miss it, and then show no noise either
         if pixels.size and (self.edge_samples > self.samples or self._few_first):
-            edge = np.isin(pixels, rim_pixels(self.scene, pose, spotlight))
+            edge = np.isin(pixels, rim_pixels(self.scene, pose, spotlight, self._blur.reach))
         else:
             edge = np.zeros(pixels.shape, bool)
         return edge.reshape(crop.height, crop.width)
@@ -153,10 +155,10 @@ class Renderer:
         """What is rendered around its outline [px]: more where that is out of focus."""
         scene = self.scene
         if scene.camera.pupil == 0.0:
-            return _MARGIN
+            return _MARGIN + self._blur.reach
         points, light = self._reached(pose, spotlight), scene.illumination.spectrum
         blurred = [scene.camera.confusion(points, wavelength) for wavelength in (light.low, light.high)]
-        return _MARGIN + math.ceil(np.nanmax(blurred, initial=0.0))
+        return _MARGIN + self._blur.reach + math.ceil(np.nanmax(blurred, initial=0.0))
 
     def _reach(self, pose: Pose, spotlight: int) -> NDArray[np.float64]:
         """Its outline `[N, 2]` in the image [px]."""
@@ -255,5 +257,6 @@ class Renderer:
             responses=self._responses,
             closed=like is None,
             source=self._source if like is None else None,
+            blur=self._blur.in_rays if like is None else None,
             like=like,
         )

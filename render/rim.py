@@ -20,14 +20,15 @@ STEEP = 0.1
 _STEP = 0.25
 
 
-def rim_pixels(scene: Scene, pose: Pose, spotlight: int) -> NDArray[np.uint32]:
+def rim_pixels(scene: Scene, pose: Pose, spotlight: int, blur: int = 0) -> NDArray[np.uint32]:
     """The pixels `[N]` of the frame (row * width + column, ascending) within half a pixel of a steep beam.
 
     Of a source that has a core or moves, the whole penumbra, and of what the lens does not have in focus all within the
-    circle of confusion. None where the beam is soft. Edges of shadows that bumps or the shaft cast are not among them.
+    circle of confusion, and `blur` [px] more. None where the beam is soft. Edges of shadows that bumps or the shaft
+    cast are not among them.
     """
     pixels = _steep(scene, pose, spotlight)
-    radius = float(np.nanmax(scene.camera.confusion(scene.outline(pose, spotlight)), initial=0.0))
+    radius = blur + float(np.nanmax(scene.camera.confusion(scene.outline(pose, spotlight)), initial=0.0))
     return _within(radius, pixels, scene.camera.shape) if radius > 0.0 else pixels
 
 

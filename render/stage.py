@@ -54,9 +54,13 @@ class Stage:
         responses: dict[str, Curve] | None = None,
         closed: bool = False,
         source: Source | None = None,
+        blur: tuple[float, float] | None = None,
         like: Stage | None = None,
     ) -> None:
-        """Load it. `like` is another stage of the same scene, whose retina is shared where the light plays no part."""
+        """Load it. `blur` is what the rays are spread by across and down [px].
+
+        `like` is another stage of the same scene, whose retina is shared where the light plays no part.
+        """
         mi, _, chosen = kernel.load()
         self._mi, self._vectorized = mi, chosen.vectorized
         self._columns = scene.camera.shape[1]
@@ -92,7 +96,7 @@ class Stage:
             self.transport = "unblocked"
         begin_inside = self.transport != "direct" and scene.camera.optics is None
         near = globe.near_plane(scene) if begin_inside else scene.camera.height / 1000.0
-        self._rays = RayGenerator(scene.camera, near) if self._vectorized else None
+        self._rays = RayGenerator(scene.camera, near, blur) if self._vectorized else None
         for group in [[channels[i]] for i in self._seen] if apart else [[channels[i] for i in self._seen]]:
             if not group:
                 continue

@@ -56,8 +56,8 @@ def trace(
     random = mi.PCG32(initstate=mi.UInt64(state), initseq=mi.UInt64(sequence))
     columns = max(d for d in range(1, int(samples**0.5) + 1) if samples % d == 0)
     column, row = _cell(k, samples, columns, halves)
-    x = mi.Float(pixel % width) + (column + random.next_float32()) / columns
-    y = mi.Float(pixel // width) + (row + random.next_float32()) * (columns / samples)
+    across, along = (column + random.next_float32()) / columns, (row + random.next_float32()) * (columns / samples)
+    x, y = camera.on_film(pixel % width, pixel // width, across, along)
     # a ray carries four wavelengths, each a quarter of the range from the next: cells of a quarter tell them all apart.
     # Cells of area and of wavelength are paired at random, or colours would lie across the pixel.
     cells = samples if camera.disperses else 4 * samples

@@ -21,7 +21,7 @@ def gaussian_table(sigma):
 
 
 def blurred(spread, glare=0.0, **camera):
-    return Blur(Camera(**{"resolution": 400, "lens": Lens(blur=spread, glare=glare), **camera}))
+    return Blur(Camera(**{"resolution": 400, "lens": Lens(blur=spread, glare=glare), **camera}), rays=False)
 
 
 @pytest.mark.parametrize("kind", ["gaussian", "table"])
