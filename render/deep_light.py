@@ -44,8 +44,8 @@ LOST = 1e-3
 RAYS = 2**16
 #: between wavelengths whose light is spread [nm]; the maps are relative to a typical t, which has the fine structure
 STEP = 25.0
-#: below this no deep light is left to spread in any eye, and the table of kernels ends [nm]
-SHORTEST = 500.0
+#: below this next to no deep light is left in any eye [nm]; the table of kernels begins at 500 nm and holds before it
+SHORTEST = 450.0
 #: at which a film is integrated
 _POINTS = 4001
 #: part of the film's response left out at either end
