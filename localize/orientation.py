@@ -53,12 +53,6 @@ def quaternion(rotation: Array) -> tuple[float, float, float, float]:
     return float(q[0]), float(q[1]), float(q[2]), float(q[3])
 
 
-def axis_of(q: tuple[float, float, float, float]) -> Array:
-    """The needle's axis `[3]` of a quaternion (x, y, z, w): z turned by it."""
-    x, y, z, w = q
-    return np.array([2.0 * (x * z + w * y), 2.0 * (y * z - w * x), 1.0 - 2.0 * (x * x + y * y)])
-
-
 def pose_covariance(found: Localization) -> Array | None:
     """Covariance `[6, 6]` over x, y, z [m] and rotations about the eye's x, y, z [rad]; None where none is stated."""
     if found.covariance is None:

@@ -21,7 +21,6 @@ Array = NDArray[np.float64]
 INDEX = 1.37
 #: absorption of the choroid [1/mm] at wavelengths [nm] (M. A. Mainster et al., Bull. Math. Biophys. 32:579, 1970)
 _CHOROID_ABSORPTION = ((532.0, 11.8), (660.0, 6.5), (850.0, 2.48), (940.0, 1.59))
-_EPITHELIUM_ABSORPTION = ((532.0, 72.0), (660.0, 38.3), (850.0, 11.8), (940.0, 7.25))
 #: melanin against the medium eye's, which Mainster's is taken for: a light fundus has a third (shared with no other
 #: formula); the dark one as in the closed form, 2.1 / 1.2
 _MELANIN: dict[Pigmentation, float] = {"light": 1.0 / 3.0, "medium": 1.0, "dark": 1.75}
@@ -36,17 +35,6 @@ class Layer:
     absorption: float  #: mu_a [1/mm]
     anisotropy: float  #: g, mean cosine of a scattering
     index: float = INDEX
-
-
-def retina(wavelength: float, scattering: float = 1.0) -> Layer:
-    """The neural retina at a wavelength [nm]: clear, and it scatters forwards."""
-    return Layer(0.25, scattering * 3.0 * 550.0 / wavelength, 0.0, 0.97)
-
-
-def epithelium(wavelength: float, pigmentation: Pigmentation, scattering: float = 1.0) -> Layer:
-    """The pigment epithelium at a wavelength [nm]."""
-    absorption = _MELANIN[pigmentation] * _between(wavelength, _EPITHELIUM_ABSORPTION)
-    return Layer(0.010, scattering * 120.0 * 550.0 / wavelength, absorption, 0.84)
 
 
 def choroid(wavelength: float, pigmentation: Pigmentation, scattering: float = 1.0) -> Layer:
@@ -70,12 +58,6 @@ def sclera(wavelength: float, scattering: float = 1.0) -> Layer:
 def deep_layers(wavelength: float, pigmentation: Pigmentation, scattering: float = 1.0) -> tuple[Layer, ...]:
     """What lies behind the pigment epithelium: choroid and sclera, at a wavelength [nm]."""
     return choroid(wavelength, pigmentation, scattering), sclera(wavelength, scattering)
-
-
-def all_layers(wavelength: float, pigmentation: Pigmentation, scattering: float = 1.0) -> tuple[Layer, ...]:
-    """The wall of the eye from the inside: retina, pigment epithelium, choroid and sclera, at a wavelength [nm]."""
-    front = retina(wavelength, scattering), epithelium(wavelength, pigmentation, scattering)
-    return *front, *deep_layers(wavelength, pigmentation, scattering)
 
 
 def _between(wavelength: float, points: tuple[tuple[float, float], ...]) -> float:
