@@ -77,12 +77,14 @@ def light(
     pose_size: int = 5,
     changes: Sequence[tuple[Profile, Profile, float]] = (),
     widenings: Sequence[tuple[Scene, float]] = (),
+    wall: float = 0.0,
 ) -> Light:
     """The spotlights' irradiance on what `sight` sees: the cones' pixel means times cosine over distance squared.
 
     The Jacobian has a row for each of `pose_size` pose parameters, the sixth being the roll, and one for each of the
     `changes`: the profile at a little more and a little less of some quantity, and how much lies between them; then
-    one for each of the `widenings`: the scene with a wider spread of the image, and how much wider.
+    one for each of the `widenings`: the scene with a wider spread of the image, and how much wider. Where light spreads
+    on the wall as well, by a Gaussian of the variance `wall` [mm^2], the last row is that one's.
     """
     axes = spotlight_axes(pose, scene.spotlights)
     basis = rotation_basis(pose.axis)[: pose_size - 3]
@@ -93,10 +95,12 @@ def light(
     cosine = -np.einsum("ij,ij->i", sight.normals, to)
     f = np.maximum(cosine, 0.0) / d2
     falloff = (sight.normals / d2[:, None] + 3.0 * (cosine / d2)[:, None] * to) / d[:, None]
-    spread = Spread.of(scene, sight, pose)
-    wider = [(Spread.of(blurrier, sight, pose), step) for blurrier, step in widenings]
+    spread = Spread.of(scene, sight, pose, wall)
+    wider = [(Spread.of(blurrier, sight, pose, wall), step) for blurrier, step in widenings]
+    if wall > 0.0:
+        wider.append((Spread.of(scene, sight, pose, 2.0 * wall), wall))
     own = 3 + len(basis)
-    total, rows = np.zeros(len(d)), np.zeros((own + len(changes) + len(widenings), len(d)))
+    total, rows = np.zeros(len(d)), np.zeros((own + len(changes) + len(wider), len(d)))
     mixed = np.zeros(len(d))  # light that a spread brings where it falls off across the edge
     for axis in axes:
         rise = Rise.of(sight, axis, to, d, profile)

@@ -7,7 +7,8 @@ Of a channel's light the share d is deep:
 with `forward`'s names and the kernel K of `scene.spread`. The microscope's light is even over the kernel's reach and
 stays what it is. The albedo is taken to be the same for both parts: how it differs is for the fits' own albedo. The
 convolution is that of the mean irradiance of cells of an equal-area map about the patches (`scene.chart`), by FFT;
-derivatives by the pose are convolved as well. What is nearer than a cell is evened out over it.
+derivatives by the pose are convolved as well. Gaussians of the kernel that are narrower than a cell would be evened out
+over it: of a beam whose edge is as narrow they are spreads of the image model instead (`nearby`).
 """
 
 from __future__ import annotations
@@ -22,6 +23,8 @@ from numpy.typing import NDArray
 from conespot.localize.model.deep import Deep
 from conespot.localize.model.estimate import Estimate
 from conespot.localize.model.forward import Light, light, rotation_basis
+from conespot.localize.model.nearby import Nearby
+from conespot.localize.model.point_spread import lens_variance
 from conespot.localize.model.quantity import Quantity
 from conespot.localize.model.sight import Sight
 from conespot.scene.chart import Chart
@@ -67,12 +70,20 @@ class DeepLight:
         moved = self.value + step @ self.jacobian[: len(step)] + longer * self.by_length
         return DeepLight(moved, self.jacobian, self.by_length)
 
+    def plus(self, share: float, near: Light, by_length: Array) -> DeepLight:
+        """The same with a share of the kernel whose light is `near`."""
+        return DeepLight(
+            self.value + share * near.value,
+            self.jacobian + share * near.jacobian,
+            self.by_length + share * by_length,
+        )
+
 
 class Glow:
-    """The deep light that places on the retina show, of patches near an estimate."""
+    """The deep light that bins of an image show, of patches near an estimate."""
 
-    def __init__(self, near: Estimate, places: Array, side_mm: float) -> None:
-        """The `places` `[N, 3]` [mm] are bins of `side_mm` [mm]; those that are NaN show none.
+    def __init__(self, near: Estimate, sight: Sight, side_mm: float) -> None:
+        """`sight` is what the bins of `side_mm` [mm] see; those that see no retina show none.
 
         The estimate's scene has deep light.
         """
@@ -80,23 +91,39 @@ class Glow:
         assert deep is not None
         self._kernels = tuple(dict.fromkeys(deep.kernels))
         self._which = [self._kernels.index(kernel) for kernel in deep.kernels]
-        chart = _chart(deep, scene, near.pose, places)
+        self._bins, self._bin = sight, side_mm
+        chart = _chart(deep, scene, near.pose, sight.points)
         self._side, cell = chart.side, chart.cell
         self._sight, self._lit = _cells(chart, scene, near.pose)
         reach = max(kernel.reach(GLOW.lost) for kernel in deep.kernels)
         self._size = int(scipy.fft.next_fast_len(self._side + min(self._side, int(np.ceil(reach / cell))), real=True))
-        self._read = _reading(chart, places)
-        # cells and the straight lines between them blur as well, bins blur what they show
-        self._blur = side_mm**2 / 12.0 - cell**2 / 4.0
+        self._read = _reading(chart, sight.points)
+        # cells and the straight lines between them blur as well, bins and the lens blur what they show
+        self._blur = side_mm**2 / 12.0 + lens_variance(scene) - cell**2 / 4.0
+        self._near = Nearby.of(self._kernels, cell if _edge(near, chart) < cell else 0.0)
+        self._far = np.array([w >= cell or not len(self._near.variances) for w in self._kernels[0].widths], float)
         y, x = np.fft.fftfreq(self._size, cell), np.fft.rfftfreq(self._size, cell)
         self._frequency = -2.0 * np.pi**2 * np.square(y), -2.0 * np.pi**2 * np.square(x)
         self._last: tuple[Estimate, list[DeepLight]] | None = None
 
-    def light(self, estimate: Estimate, free: tuple[Quantity, ...]) -> list[DeepLight]:
-        """The deep light of every channel.
+    def light(self, estimate: Estimate, free: tuple[Quantity, ...], sharp: Light) -> list[DeepLight]:
+        """The deep light of every channel, of which the bins would see `sharp` if none of it were.
 
-        The Jacobians have rows for the pose and the `free` quantities of the beam.
+        The Jacobians have its rows: for the pose and the `free` quantities of the beam and of what spreads the image.
         """
+        # deep light on the map is wider than any spread of the image: it does not change with that
+        none = sum(each.changes == "spread" for each in free)
+        found = [
+            DeepLight(one.value, np.pad(one.jacobian, ((0, none), (0, 0))), one.by_length)
+            for one in self._wide(estimate, free)
+        ]
+        each = self._near.lights(self._bins, self._bin, estimate, free, sharp, _length(estimate))
+        for (near, longer), shares in zip(each, self._near.shares.T.tolist(), strict=True):
+            found = [one.plus(share, near, longer) for one, share in zip(found, shares, strict=True)]
+        return [found[k] for k in self._which]
+
+    def _wide(self, estimate: Estimate, free: tuple[Quantity, ...]) -> list[DeepLight]:
+        """What the map holds, by each of the kernels; rows for the pose and the beam."""
         beam = any(each.changes == "beam" for each in free)
         if self._last is not None and not beam:
             before, found = self._last
@@ -104,13 +131,12 @@ class Glow:
             tip, turn, length = GLOW.straight
             size = estimate.pose_size
             if max(np.abs(step[:3]).max() / tip, np.abs(step[3:size]).max() / turn, abs(longer) / length) < 1.0:
-                each = [one.after(step[:size], longer) for one in found]
-                return [each[k] for k in self._which]
+                return [one.after(step[:size], longer) for one in found]
         changes = estimate.beam_changes(free)
         scene, pose = estimate.scene, estimate.pose
         here = light(self._sight, pose, scene, estimate.profile, pose_size=estimate.pose_size, changes=changes)
         self._last = estimate, self._spread(here, _length(estimate))
-        return [self._last[1][k] for k in self._which]
+        return self._last[1]
 
     def _spread(self, here: Light, length: float) -> list[DeepLight]:
         """What becomes of the light of the lit cells, by each of the kernels."""
@@ -133,8 +159,9 @@ class Glow:
         variance = np.maximum(own + self._blur, 0.0)
         fy, fx = self._frequency
         down, along = (np.exp(np.multiply.outer(variance, f)) for f in self._frequency)
-        moves = np.where(own + self._blur > 0.0, 2.0 * own, 0.0) * kernel.parts
-        transfer = (kernel.parts[:, None] * down).T @ along
+        parts = kernel.parts * self._far
+        moves = np.where(own + self._blur > 0.0, 2.0 * own, 0.0) * parts
+        transfer = (parts[:, None] * down).T @ along
         slope = (moves[:, None] * down * fy).T @ along + (moves[:, None] * down).T @ (along * fx)
         return np.asarray(transfer, np.float32), np.asarray(slope, np.float32)
 
@@ -151,6 +178,13 @@ def _step(before: Estimate, after: Estimate) -> Array:
     turn = after.pose.rotation() @ before.pose.rotation().T
     vector = 0.5 * np.array([turn[2, 1] - turn[1, 2], turn[0, 2] - turn[2, 0], turn[1, 0] - turn[0, 1]])
     return np.concatenate([after.pose.apex - before.pose.apex, rotation_basis(before.pose.axis) @ vector])
+
+
+def _edge(near: Estimate, chart: Chart) -> float:
+    """How far from its rim a beam reaches half of its light [mm]."""
+    middle = chart.surface.points(chart.eye, chart.centre)
+    beam = near.scene.beam
+    return float(np.linalg.norm(middle - near.pose.apex)) * (beam.half_angle - near.profile.angle_at(0.5))
 
 
 def _directions(away: Array) -> Array:

@@ -43,7 +43,7 @@ class Irradiance:
         self._lit = np.flatnonzero(lit)
         self._there = sight if lit.all() else sight.part(self._lit)
         deep = Deep.of(near.scene)
-        self._glow = None if deep is None else Glow(near, sight.points, side * near.scene.camera.pixel_pitch)
+        self._glow = None if deep is None else Glow(near, sight, side * near.scene.camera.pixel_pitch)
 
     def __call__(self, estimate: Estimate, knowns: Knowns | None = None) -> Lights:
         """The irradiance where a fit stands, with derivatives by all that its own or other `knowns` leave free."""
@@ -57,7 +57,9 @@ class Irradiance:
             local[0][lit], local[1][:, lit] = value, rows
         deep = Deep.of(estimate.scene)
         assert deep is not None
-        lights = self._glow.light(estimate, free)
+        moving = sum(each.changes in ("sight", "glow") for each in free)
+        sharp = Light(local[0], local[1][: estimate.pose_size + len(free) - moving])
+        lights = self._glow.light(estimate, free, sharp)
         each = zip(deep.shares.tolist(), lights, strict=True)
         return Lights(tuple(self._mixed(local, light, share, estimate, free) for share, light in each))
 
@@ -66,8 +68,7 @@ class Irradiance:
     ) -> tuple[Array, Array]:
         """A channel's irradiance of which a `share` is deep, and its derivatives."""
         value, rows = local
-        # deep light is wider than any spread of the image: it does not change with that
-        by_pose = [deep.jacobian, np.zeros((sum(each.changes == "spread" for each in free), len(value)))]
+        by_pose = [deep.jacobian]
         here = Light(deep.value, deep.jacobian)
         for each in (each for each in free if each.changes == "sight"):
             sides = _sides(estimate, each, self._pixels, self._side)

@@ -44,6 +44,12 @@ class Rise:
         """Half the rise of the variable across a pixel and down it, without signs `[N]` each."""
         return np.abs(self.gx) * self.stretch / 2.0, np.abs(self.gy) * self.stretch / 2.0
 
+    @property
+    def along_wall(self) -> Array:
+        """The cosine's gradient on the wall `[N, 3]` [1/mm]."""
+        normals = self.sight.normals
+        return np.asarray(self.across - np.einsum("ij,ij->i", self.across, normals)[:, None] * normals)
+
     def raised(self, at: NDArray[np.intp], by: Array) -> Array:
         """The variable `[N]` where the cosine is larger at some pixels."""
         w = self.w.copy()
@@ -69,6 +75,12 @@ class Rise:
         ex, ey = (gx / length)[:, None], (gy / length)[:, None]
         x, y = self.sight.along_x[at], self.sight.along_y[at]
         return self.second(at, -ey * x + ex * y, radius), self.second(at, ex * x + ey * y, radius)
+
+    def on_wall(self, at: NDArray[np.intp], radius: float) -> tuple[Array, Array]:
+        """The same by one millimetre on the wall."""
+        flat = self.along_wall[at]
+        unit = flat / np.maximum(np.linalg.norm(flat, axis=1, keepdims=True), 1e-300)
+        return self.second(at, np.cross(self.sight.normals[at], unit), radius), self.second(at, unit, radius)
 
     def at_tip(self, at: NDArray[np.intp]) -> tuple[Array, Array]:
         """The same by a millimetre of the tip in the plane across the axis."""

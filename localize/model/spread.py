@@ -1,4 +1,4 @@
-"""Even spreads of an image, as a beam's variable sees them: the lens' blur, what is out of focus, a core, a motion.
+"""Even spreads of an image, as a beam's variable sees them: lens, defocus, a core, a motion, light under the retina.
 
 Across an edge the variable is a plane, so a spread of any kind is one along it, with the variance that it has there.
 Where the light falls off across it, or the outline is curved, it moves the edge as well: by the covariance of light and
@@ -26,7 +26,6 @@ Array = NDArray[np.float64]
 #: standard deviations on either side of an edge where its bend counts
 _FAR = 4.0
 _STEP = 0.01  # of the tip [mm], for second differences
-_STEP = 0.01  # of the tip [mm], for second differences
 
 
 def way_covariance(scene: Scene) -> Array:
@@ -52,11 +51,12 @@ class Widths:
     defocus: Array  #: of discs: out of focus,
     core: Array  #: and of the tip
     way: Array  #: of a steady motion
+    wall: Array  #: of a Gaussian on the wall
 
     @property
     def variance(self) -> Array:
         """All of it."""
-        return np.asarray(self.lens + self.defocus + self.core + self.way)
+        return np.asarray(self.lens + self.defocus + self.core + self.way + self.wall)
 
     @property
     def gaussian_and_disc(self) -> tuple[Array, Array]:
@@ -79,10 +79,14 @@ class Spread:
     core: float  #: variance of the disc at the tip, across the cone's axis [mm^2]
     way: Array | None  #: covariance of the tip's places `[3, 3]` [mm^2]; the needle goes on through the RCM
     needle: tuple[Array, float]  #: its axis `[3]`, and how far the tip is from the RCM [mm]
+    wall: float  #: variance of a Gaussian on the wall [mm^2]: light that comes back beside where it fell
 
     @classmethod
-    def of(cls, scene: Scene, sight: Sight, pose: Pose) -> Spread:
-        """The spreads of a scene for what a sight's pixels see, for an instrument near a pose."""
+    def of(cls, scene: Scene, sight: Sight, pose: Pose, wall: float = 0.0) -> Spread:
+        """The spreads of a scene for what a sight's pixels see, for an instrument near a pose.
+
+        Of `wall` [mm^2] a scene tells by its retina (`model.deep`).
+        """
         variance, core, way = lens_variance(scene), scene.beam.source_diameter / 2.0, way_covariance(scene)
         along = variance / (scene.camera.pixel_pitch * sight.side) ** 2
         return cls(
@@ -91,28 +95,33 @@ class Spread:
             core**2 / 4.0,
             way if np.any(way) else None,
             (pose.axis, float(np.linalg.norm(pose.apex - np.asarray(scene.instrument.rcm)))),
+            wall,
         )
 
     @property
     def is_none(self) -> bool:
         """Whether all is sharp."""
-        return not (any(self.lens) or self.core) and self.defocus is None and self.way is None
+        return not (any(self.lens) or self.core or self.wall) and self.defocus is None and self.way is None
 
     def widths(self, rise: Rise) -> Widths:
         """The variances along a beam's cosine."""
         squares, nothing = (np.square(rise.gx), np.square(rise.gy)), np.zeros_like(rise.gx)
-        core, way = nothing, nothing
+        core, way, wall = nothing, nothing, nothing
         if self.core:
             flat = np.einsum("ij,ij->i", rise.across, rise.across) - np.square(rise.across @ rise.axis)
             core = self.core * np.maximum(flat, 0.0)
         if self.way is not None:
             tip = self._by_tip(rise)
             way = np.maximum(np.einsum("ij,jk,ik->i", tip, self.way, tip), 0.0)
+        if self.wall:
+            along = rise.along_wall
+            wall = self.wall * np.einsum("ij,ij->i", along, along)
         return Widths(
             self.lens[0] * squares[0] + self.lens[1] * squares[1],
             nothing if self.defocus is None else self.defocus * (squares[0] + squares[1]),
             core,
             way,
+            wall,
         )
 
     def covariance(self, rise: Rise, gradient: Array, radius: float) -> Array:
@@ -129,6 +138,8 @@ class Spread:
             found = found - self.core * np.einsum("ij,ij->i", gradient, flat)
         if self.way is not None:
             found = found + np.einsum("ij,jk,ik->i", gradient, self.way, self._by_tip(rise))
+        if self.wall:
+            found = found + self.wall * np.einsum("ij,ij->i", over, rise.along_wall)
         return np.asarray(found)
 
     def bent(self, rise: Rise, widths: Widths, profile: Profile, radius: float) -> tuple[Array, Array]:
@@ -167,6 +178,10 @@ class Spread:
             tangential, normal = (h * self.core for h in rise.at_tip(at))
             yield tangential, 0.0
             yield normal, widths.core[at]
+        if self.wall:
+            tangential, normal = (h * self.wall for h in rise.on_wall(at, radius))
+            yield tangential, 0.0
+            yield normal, widths.wall[at]
         if self.way is not None:
             tip, (values, axes) = self._by_tip(rise)[at], np.linalg.eigh(self.way)
             for variance, along in zip(values, axes.T, strict=True):

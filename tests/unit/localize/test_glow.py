@@ -14,9 +14,10 @@ from conespot.localize import Knowns, SensorNoise, locate
 from conespot.localize.calibration import NAMES, calibrate
 from conespot.localize.model.deep import Deep
 from conespot.localize.model.estimate import Estimate
-from conespot.localize.model.forward import moved
+from conespot.localize.model.forward import light, moved
 from conespot.localize.model.glow import Glow
 from conespot.localize.model.knowns import DEEP_SIGMA
+from conespot.localize.model.sight import Sight
 from conespot.localize.theory.bounds import cramer_rao
 from conespot.scene import Scene
 from conespot.scene.beam import CyclesBeam, HardBeam
@@ -30,6 +31,7 @@ PEAK, AMBIENT, READ = 9000.0, 200.0, 15.0
 NOISE = SensorNoise(levels=4095, electrons=1.25 * PEAK, read=READ)
 INFRARED = FlatBand(name="infrared", low=845.0, high=855.0)
 CELL = 0.01  # of the frames' convolution [mm]
+SIDE = 1e-3  # of the bins that look at single places [mm]
 
 
 def scene_of(beam=None, *, resolution=1000, spread=None):
@@ -91,6 +93,22 @@ def frame(scene, pose, seed, fine=4):
     return np.clip(np.round(electrons / (1.25 * PEAK) * 4095.0), 0, 4095).astype(np.uint16)
 
 
+def bins_at(places, scene):
+    """Bins of `SIDE` mm that look straight at places of the eye's sphere."""
+    normals = _unit(scene.eye.centre - places)
+    first = _unit(np.cross(normals, np.array([0.3, 0.9, 0.1])))
+    return Sight(places, normals, SIDE * first, SIDE * np.cross(normals, first))
+
+
+def sharp(sight, estimate):
+    return light(sight, estimate.pose, estimate.scene, estimate.profile)
+
+
+def glow_at(places, estimate, near=None):
+    sight = bins_at(places, estimate.scene)
+    return Glow(near or estimate, sight, SIDE).light(estimate, (), sharp(sight, estimate))[0]
+
+
 def test_deep_light_is_the_sum_over_the_patch_of_the_kernel_at_true_distances():
     scene = scene_of()
     pose = scene.pose(np.array([1.5, -1.0, 4.0]))
@@ -98,7 +116,7 @@ def test_deep_light_is_the_sum_over_the_patch_of_the_kernel_at_true_distances():
     middle = rim.mean(axis=0)
     places = np.concatenate([middle + factor * (rim - middle) for factor in (0.0, 0.5, 0.9, 1.1, 1.5, 2.0)])
     places = scene.eye.centre + scene.eye.radius * _unit(places - scene.eye.centre)
-    (found,) = Glow(Estimate(pose, scene), places, 1e-3).light(Estimate(pose, scene), ())
+    found = glow_at(places, Estimate(pose, scene))
     axis = _unit(middle - scene.eye.centre)
     cosine = np.cos(0.07 * np.sqrt((np.arange(40_000) + 0.5) / 40_000))  # an even lattice of the cap about the patch
     turn = np.arange(40_000) * math.pi * (3.0 - math.sqrt(5.0))
@@ -116,15 +134,38 @@ def _unit(vector):
     return vector / np.linalg.norm(vector, axis=-1, keepdims=True)
 
 
+def test_next_to_a_hard_rim_deep_light_falls_as_the_kernel_says_and_not_by_cells():
+    """The mean irradiance where light comes from, by quantiles of the kernel's distances in all directions."""
+    scene = scene_of()
+    pose = scene.pose(np.array([0.5, -1.0, 4.0]))
+    rim = scene.outline(pose, 0, 2)
+    outwards = _unit(rim - rim.mean(axis=0))
+    offsets = np.array([-0.1, -0.03, -0.01, -0.003, 0.003, 0.01, 0.03, 0.1])
+    eye, kernel = scene.eye, Deep.of(scene).kernels[0]
+    up = _unit((rim + offsets[:, None, None] * outwards).reshape(-1, 3) - eye.centre)
+    radii = np.geomspace(1e-4, 10.0, 4000)
+    chord = np.interp((np.arange(1200) + 0.5) / 1200, kernel.enclosed(radii), radii)
+    turn = np.arange(180)[:, None] * (2.0 * math.pi / 180)
+    summed = []
+    for at in up:
+        first, second = np.linalg.svd(at[None])[2][1:]
+        sideways = (np.cos(turn) * first + np.sin(turn) * second)[:, None]
+        away = (1.0 - chord**2 / (2.0 * eye.radius**2))[:, None] * at
+        away = away + (chord / eye.radius * np.sqrt(1.0 - np.square(chord / eye.radius) / 4.0))[:, None] * sideways
+        summed.append(irradiance(scene, pose, eye.centre + eye.radius * away).mean())
+    found = glow_at(eye.centre + eye.radius * up, Estimate(pose, scene))
+    assert found.value == pytest.approx(np.array(summed), abs=0.003 * max(summed))
+
+
 def test_derivatives_of_deep_light_are_those_of_its_value():
     scene = scene_of(CyclesBeam())
     pose = scene.pose(np.array([0.5, 1.0, 4.0]))
     rim = scene.outline(pose, 0, 24)
     here = Estimate(pose, scene)
-    (found,) = Glow(here, rim, 1e-3).light(here, ())
+    found = glow_at(rim, here)
 
     def at(estimate):
-        return Glow(here, rim, 1e-3).light(estimate, ())[0].value
+        return glow_at(rim, estimate, near=here).value
 
     for k, row in enumerate(found.jacobian):
         step = np.eye(5)[k] * 1e-3
@@ -140,10 +181,11 @@ def test_near_its_last_place_deep_light_goes_on_in_proportion():
     pose = scene.pose(np.array([0.0, 1.0, 4.0]))
     rim = scene.outline(pose, 0, 24)
     here, there = Estimate(pose, scene), Estimate(moved(pose, np.array([0.002, -0.002, 0.002, 3e-4, -3e-4])), scene)
-    glow = Glow(here, rim, 1e-3)
-    glow.light(here, ())
-    whole = Glow(here, rim, 1e-3).light(there, ())[0].value
-    assert glow.light(there, ())[0].value == pytest.approx(whole, rel=0.01)
+    sight = bins_at(rim, scene)
+    glow = Glow(here, sight, SIDE)
+    glow.light(here, (), sharp(sight, here))
+    whole = glow_at(rim, there, near=here).value
+    assert glow.light(there, (), sharp(sight, there))[0].value == pytest.approx(whole, rel=0.01)
 
 
 @pytest.mark.parametrize("beam", [HardBeam(), CyclesBeam()], ids=["hard", "soft"])
