@@ -6,12 +6,24 @@ import sys
 
 import pytest
 
-CAMPAIGN = [sys.executable, "-m", "conespot"]
+from conespot.campaigns.command import main
+
 GOOD = "scene: {preset: paper-code, camera: {resolution: 200}}\nposes: 2\n"
 
 
-def campaign(*arguments, cwd):
-    return subprocess.run([*CAMPAIGN, *map(str, arguments)], cwd=cwd, capture_output=True, text=True, timeout=60)
+@pytest.fixture
+def campaign(tmp_path, monkeypatch, capsys):
+    """Runs a command in this process, which starts sooner: its exit code, and what it said on stdout and stderr."""
+    monkeypatch.chdir(tmp_path)
+
+    def run(*arguments):
+        try:
+            code = main(arguments)
+        except SystemExit as ending:  # argparse's
+            code = ending.code
+        return code, *capsys.readouterr()
+
+    return run
 
 
 @pytest.mark.parametrize(
@@ -45,41 +57,43 @@ def campaign(*arguments, cwd):
         (GOOD, ["--out", "/proc/run"], "/proc/run: cannot be written: "),
     ],
 )  # fmt: skip
-def test_bad_input_is_refused_in_one_sentence(tmp_path, text, options, says):
+def test_bad_input_is_refused_in_one_sentence(campaign, tmp_path, text, options, says):
     (tmp_path / "c.yaml").write_text(text)
-    done = campaign("run", "c.yaml", *options, cwd=tmp_path)
-    assert done.returncode == 2
-    assert says in done.stderr
-    assert done.stderr.splitlines()[-1].startswith("campaign")
-    assert len(done.stderr.splitlines()) == 1 or "usage:" in done.stderr
-    assert done.stdout == ""
+    code, out, err = campaign("run", "c.yaml", *options)
+    assert code == 2
+    assert says in err
+    assert err.splitlines()[-1].startswith("campaign")
+    assert len(err.splitlines()) == 1 or "usage:" in err
+    assert out == ""
     assert os.listdir(tmp_path) == ["c.yaml"]
 
 
 def test_a_missing_file_is_refused(tmp_path):
-    done = campaign("run", "absent.yaml", cwd=tmp_path)
+    """By the command as it is called."""
+    command = [sys.executable, "-m", "conespot", "run", "absent.yaml"]
+    done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, timeout=60)
     assert done.returncode == 2
     assert done.stderr.startswith("campaign: absent.yaml: no such campaign, neither a file nor shipped; ")
     assert os.listdir(tmp_path) == []
 
 
-def test_a_misspelt_shipped_campaign_is_refused_with_the_right_one(tmp_path):
-    done = campaign("plan", "powr_sweep", cwd=tmp_path)
-    assert done.returncode == 2
-    assert "did you mean 'power_sweep'?" in done.stderr
+def test_a_misspelt_shipped_campaign_is_refused_with_the_right_one(campaign):
+    code, _, err = campaign("plan", "powr_sweep")
+    assert code == 2
+    assert "did you mean 'power_sweep'?" in err
 
 
 @pytest.mark.skipif(os.geteuid() == 0, reason="root may write anywhere")
-def test_a_folder_without_permission_is_refused(tmp_path):
+def test_a_folder_without_permission_is_refused(campaign, tmp_path):
     (tmp_path / "c.yaml").write_text(GOOD)
     (tmp_path / "closed").mkdir(mode=0o500)
-    done = campaign("run", "c.yaml", "--out", "closed/run", cwd=tmp_path)
-    assert done.returncode == 2
-    assert "closed/run: cannot be written: Permission denied" in done.stderr
+    code, _, err = campaign("run", "c.yaml", "--out", "closed/run")
+    assert code == 2
+    assert "closed/run: cannot be written: Permission denied" in err
 
 
 @pytest.mark.parametrize("arguments", [[], ["fly"], ["run"], ["run", "power_sweep", "--fast"]])
-def test_a_wrong_command_line_is_exit_code_2(tmp_path, arguments):
-    done = campaign(*arguments, cwd=tmp_path)
-    assert done.returncode == 2
-    assert "usage: campaign" in done.stderr
+def test_a_wrong_command_line_is_exit_code_2(campaign, arguments):
+    code, _, err = campaign(*arguments)
+    assert code == 2
+    assert "usage: campaign" in err

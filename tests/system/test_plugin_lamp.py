@@ -1,5 +1,6 @@
 """A lamp of another installed distribution: named in YAML, kept in the run, and one sentence when it breaks."""
 
+import json
 import os
 import subprocess
 import sys
@@ -26,17 +27,20 @@ class Fickle:
 fickle = Fickle()
 none = 5
 """
+#: what a fresh Python says of every scene in its folder: its light, that at 590 nm, and its file; or a sentence
 READ = """\
+import json, pathlib
 from conespot.scene import InputError, load_scene
 from conespot.scene.document import dump
 
-try:
-    scene = load_scene("s.yaml")
-    print(repr(scene.illumination))
-    print(scene.illumination.spectrum(590))
-    open("resolved.yaml", "w").write(dump(scene))
-except InputError as error:
-    print(error)
+said = {}
+for path in pathlib.Path().glob("*.yaml"):
+    try:
+        scene = load_scene(path.name)
+        said[path.stem] = [repr(scene.illumination), float(scene.illumination.spectrum(590)), dump(scene)]
+    except InputError as error:
+        said[path.stem] = str(error)
+print(json.dumps(said))
 """
 NAMES = ["amber", "ultraviolet", "negative", "fickle", "none"]
 
@@ -55,43 +59,48 @@ def site(tmp_path_factory):
     return site
 
 
-def read(folder, text, path=""):
-    """What a fresh Python says of the scene in `text`, and the file that it writes of it."""
-    (folder / "s.yaml").write_text(text)
+def read(folder, texts, path=""):
+    for name, text in texts.items():
+        (folder / f"{name}.yaml").write_text(text)
     environment = {**os.environ, "PYTHONPATH": str(path)}
     command = [sys.executable, "-c", READ]
     done = subprocess.run(command, cwd=folder, env=environment, capture_output=True, text=True, timeout=60)
     assert done.returncode == 0, done.stderr
-    return done.stdout
+    return json.loads(done.stdout)
 
 
-def test_a_scene_names_it_and_its_spectrum_is_in_the_scene(site, tmp_path):
+#: names of no lamp, with what is said of them
+NO_LAMP = {
+    "gone": "light 'gone' (no_such_module:x of lamps 1.0) cannot be loaded: ModuleNotFoundError",
+    "none": "light 'none' (lamps:none of lamps 1.0) is none: TypeError: its spectrum is no conespot.scene",
+    "fickle": "light 'fickle' (lamps:fickle of lamps 1.0) is none: RuntimeError: no such luck; mend or uninstall",
+    "negative": "must not be negative",
+    "ultraviolet": "wavelengths must lie in 300 to 1100 nm",
+    "ambre": "unknown light 'ambre'; did you mean 'amber'?",
+}
+
+
+@pytest.fixture(scope="module")
+def found(site, tmp_path_factory):
+    """What is said of every light by its name."""
+    texts = {name: f"illumination: {name}\n" for name in ("amber", "white", *NO_LAMP)}
+    return read(tmp_path_factory.mktemp("scenes"), texts, site)
+
+
+def test_a_scene_names_it_and_its_spectrum_is_in_the_scene(found, tmp_path):
     """A triangle of 20 nm: at its peak 1/10 per nm; the resolved scene reads the same without the package."""
-    found = read(tmp_path, "illumination: amber\n", site)
-    assert "name='amber', package='lamps 1.0'" in found
-    assert float(found.splitlines()[1]) == pytest.approx(0.1)
-    resolved = (tmp_path / "resolved.yaml").read_text()
-    assert read(tmp_path, resolved) == found
-    assert (tmp_path / "resolved.yaml").read_text() == resolved
+    light, at_peak, resolved = found["amber"]
+    assert "name='amber', package='lamps 1.0'" in light
+    assert at_peak == pytest.approx(0.1)
+    assert read(tmp_path, {"resolved": resolved})["resolved"] == found["amber"]
 
 
-def test_nobody_takes_the_name_of_a_light_of_this_package(site, tmp_path):
-    assert read(tmp_path, "illumination: white\n", site).startswith("FlatBand(")
+def test_nobody_takes_the_name_of_a_light_of_this_package(found):
+    assert found["white"][0].startswith("FlatBand(")
 
 
-@pytest.mark.parametrize(
-    ("name", "says"),
-    [
-        ("gone", "light 'gone' (no_such_module:x of lamps 1.0) cannot be loaded: ModuleNotFoundError"),
-        ("none", "light 'none' (lamps:none of lamps 1.0) is none: TypeError: its spectrum is no conespot.scene"),
-        ("fickle", "light 'fickle' (lamps:fickle of lamps 1.0) is none: RuntimeError: no such luck; mend or uninstall"),
-        ("negative", "must not be negative"),
-        ("ultraviolet", "wavelengths must lie in 300 to 1100 nm"),
-        ("ambre", "unknown light 'ambre'; did you mean 'amber'?"),
-    ],
-)
-def test_what_is_no_lamp_is_one_sentence_that_names_the_package(site, tmp_path, name, says):
-    found = read(tmp_path, f"illumination: {name}\n", site)
-    assert says in found
-    assert found.startswith("s.yaml:1: illumination: ")
-    assert found.count("\n") == 1
+@pytest.mark.parametrize(("name", "says"), NO_LAMP.items())
+def test_what_is_no_lamp_is_one_sentence_that_names_the_package(found, name, says):
+    assert says in found[name]
+    assert found[name].startswith(f"{name}.yaml:1: illumination: ")
+    assert "\n" not in found[name]
