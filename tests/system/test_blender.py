@@ -31,6 +31,14 @@ def blender_python() -> str | None:
     return os.environ.get("CONESPOT_BLENDER_PYTHON") or (sys.executable if importlib.util.find_spec("bpy") else None)
 
 
+pytestmark = [
+    pytest.mark.slow,
+    pytest.mark.skipif(
+        blender_python() is None, reason="no bpy here: pip install 'conespot[blender]' in a Python 3.11"
+    ),
+]
+
+
 def radius_at(image: np.ndarray, centre: np.ndarray, level: float, directions: int = 72) -> np.ndarray:
     """Distance [px] from `centre` (x, y) at which the image falls through `level`, in each direction."""
     steps = np.arange(0.0, 120.0, 0.05)
@@ -60,7 +68,6 @@ def rendered(scene: Scene, pose: Pose, folder: Path, samples: int) -> tuple[np.n
     return theirs, ours
 
 
-@pytest.mark.skipif(blender_python() is None, reason="no bpy here: pip install 'conespot[blender]' in a Python 3.11")
 @pytest.mark.parametrize("beam", [HardBeam(), CyclesBeam(blend=1.0)], ids=["hard", "soft"])
 def test_cycles_agrees_with_mitsuba(beam, tmp_path):
     """Radiance of a 500 px frame by Cycles and by us; median ratio within 0.5 %, patch edge within 0.1 px all round."""
@@ -90,7 +97,6 @@ storage: {{white: {white}}}
 """
 
 
-@pytest.mark.skipif(blender_python() is None, reason="no bpy here: pip install 'conespot[blender]' in a Python 3.11")
 def test_a_frame_of_cycles_described_by_documented_keys_alone_is_localized_as_well_as_our_own(tmp_path):
     """Both as EXR of linear light through `campaign localize`: tips within 6 um of the truth, and of each other."""
     scene = Scene(camera=Camera(resolution=500), retina=UniformRetina(albedo=0.2), beam=HardBeam())
@@ -110,7 +116,6 @@ def test_a_frame_of_cycles_described_by_documented_keys_alone_is_localized_as_we
     assert np.linalg.norm(tips[0] - tips[1]) < 6e-3
 
 
-@pytest.mark.skipif(blender_python() is None, reason="no bpy here: pip install 'conespot[blender]' in a Python 3.11")
 @pytest.mark.parametrize("focus", [0.0, 4.0])
 def test_cycles_agrees_with_mitsuba_through_an_aperture(focus, tmp_path):
     """A hard patch, in focus and 4 mm out of it, by Cycles' thin lens of the same aperture and by ours.
