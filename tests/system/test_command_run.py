@@ -97,7 +97,8 @@ def test_a_metered_camera_exposes_alike_on_every_worker(tmp_path):
     (tmp_path / "m.yaml").write_text(TEXT + "  scene.sensor: [cmv12000-mono]\n")
     runs = [tmp_path / "one", tmp_path / "two"]
     for workers, run in enumerate(runs, start=1):
-        done = campaign("run", "m.yaml", "--workers", workers, "--poses", 4, "--out", run, cwd=tmp_path)
+        options = ["--poses", 4, "--samples", 16]
+        done = campaign("run", "m.yaml", "--workers", workers, *options, "--out", run, cwd=tmp_path)
         assert done.returncode == 0, done.stderr
     assert (runs[0] / "errors.csv").read_bytes() == (runs[1] / "errors.csv").read_bytes()
     assert (pd.read_csv(runs[0] / "errors.csv")["status"] == "ok").any()
@@ -133,34 +134,39 @@ def test_an_interrupted_and_a_killed_run_go_on_to_the_same_bytes(folder, straigh
     assert (run / "journal.jsonl").read_bytes().count(b"\n") == 10 + 1  # nothing is deleted, not the torn line either
 
 
-def test_a_finished_run_does_nothing_again(folder, straight):
+@pytest.fixture
+def here(folder, monkeypatch, capsys):
+    """Runs a command in this process and the runs' folder: its exit code, and what it said on stdout and stderr."""
+    monkeypatch.chdir(folder)
+    return lambda *arguments: (main(arguments), *capsys.readouterr())
+
+
+def test_a_finished_run_does_nothing_again(here, straight):
     before = (straight[0] / "journal.jsonl").stat().st_mtime_ns
-    done = campaign("run", "c.yaml", "--out", "straight", cwd=folder)
-    assert done.returncode == 0
-    assert "10 of 10 poses are finished" in done.stderr
+    code, _, err = here("run", "c.yaml", "--out", "straight")
+    assert code == 0
+    assert "10 of 10 poses are finished" in err
     assert (straight[0] / "journal.jsonl").stat().st_mtime_ns == before
 
 
-def test_other_settings_do_not_overwrite_a_run(folder, straight):
+def test_other_settings_do_not_overwrite_a_run(here, straight):
     before = (straight[0] / "errors.csv").read_bytes()
-    done = campaign("run", "c.yaml", "--seed", 2, "--out", "straight", cwd=folder)
-    assert done.returncode == 2
-    assert done.stderr == (
-        "campaign: straight: holds the run of another campaign or other settings; choose another --out\n"
-    )
+    code, _, err = here("run", "c.yaml", "--seed", "2", "--out", "straight")
+    assert code == 2
+    assert err == "campaign: straight: holds the run of another campaign or other settings; choose another --out\n"
     assert (straight[0] / "errors.csv").read_bytes() == before
 
 
-def test_report_makes_everything_again_from_the_journal(folder, straight):
+def test_report_makes_everything_again_from_the_journal(here, straight):
     run, first = straight
     rows = (run / "errors.csv").read_bytes()
     for name in ("errors.csv", "errors.parquet", "report.html"):
         (run / name).unlink()
-    done = campaign("report", "straight", cwd=folder)
-    assert done.returncode == 0, done.stderr
+    code, out, err = here("report", "straight")
+    assert code == 0, err
     assert (run / "errors.csv").read_bytes() == rows
     assert (run / "report.html").exists()
-    assert done.stdout == first.stdout
+    assert out == first.stdout
 
 
 def test_one_pose_alone_gives_the_runs_own_row_and_pictures_of_what_was_seen(straight, capsys):
@@ -201,11 +207,11 @@ def test_frames_are_kept_when_asked_for(folder):
     assert sorted(p.suffix for p in (folder / "kept" / "frames").iterdir()) == [".exr", ".png"]
 
 
-def test_theory_alone_renders_nothing(tmp_path):
-    done = campaign("run", "theory", cwd=tmp_path)
-    assert done.returncode == 0, done.stderr
+def test_theory_alone_renders_nothing(tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    assert main(["run", "theory"]) == 0
     assert os.listdir(tmp_path / "runs") == ["theory"]
     table = pd.read_csv(tmp_path / "runs" / "theory" / "theory.csv")
     published = [0.08, 0.23, 0.49, 0.91, 1.51, 2.34]
     assert table["in_plane_um"].tolist() == pytest.approx(published, abs=0.02)
-    assert "Table I" in done.stdout
+    assert "Table I" in capsys.readouterr().out

@@ -44,7 +44,11 @@ def both():
     return make
 
 
-@pytest.mark.parametrize("name", SCENES)
+#: bumps take as long as all others
+EACH = [pytest.param(name, marks=pytest.mark.slow if name == "bumps" else ()) for name in SCENES]
+
+
+@pytest.mark.parametrize("name", EACH)
 def test_few_samples_show_what_all_of_them_show(both, name):
     """Means of 16 renderings; z-test per pixel, Sidak-corrected at 1 %, and of all pixels together."""
     _, few, many = (a.astype(float) if isinstance(a, np.ndarray) else a for a in both(name))
@@ -57,7 +61,7 @@ def test_few_samples_show_what_all_of_them_show(both, name):
     assert abs(z.mean()) * np.sqrt(lit.sum()) < 5.0
 
 
-@pytest.mark.parametrize("name", SCENES)
+@pytest.mark.parametrize("name", EACH)
 def test_noise_is_what_the_sensor_forgives_or_what_all_samples_leave(both, name):
     """Pixels twice as noisy as the tolerance and as all samples leave them; against 1 % of all.
 

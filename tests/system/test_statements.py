@@ -50,7 +50,7 @@ def answered(group, pose):
 
 
 #: those that are told apart by what no other is: the others are read where there is more time
-QUICK = ("deformation", "power_sweep", "reality")
+QUICK = ("deformation", "power_sweep")
 EACH = [pytest.param(name, marks=() if name in QUICK else pytest.mark.slow) for name in CAMPAIGNS]
 
 
