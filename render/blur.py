@@ -13,8 +13,6 @@ from typing import assert_never
 import cv2
 import numpy as np
 from numpy.typing import NDArray
-from scipy.optimize import brentq
-from scipy.special import ndtr
 
 from conespot.render.tile import Tile
 from conespot.scene import Camera
@@ -134,6 +132,8 @@ def _in_rays(camera: Camera) -> tuple[float, float] | None:
 
 def places(sigma: float) -> Array:
     """Where the rays of a pixel lie that are spread by `sigma` [px]: quantiles `[n]` from 0 to 1, about its middle."""
+    from scipy.special import ndtr  # every process of a campaign would wait for it
+
     reach = 0.5 + _FAR * sigma
     x = np.linspace(-reach, reach, 32 * _QUANTILES)
 
@@ -149,6 +149,9 @@ def _gaussian(sigma: float) -> Array:
 
     Pixels' values are integrals already; those of the very Gaussian would add a pixel's variance of 1/12 once more.
     """
+    from scipy.optimize import brentq  # every process of a campaign would wait for it
+    from scipy.special import ndtr
+
     reach = math.ceil(_FAR * sigma) + 1
     places = np.arange(-reach, reach + 1)
 

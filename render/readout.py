@@ -13,7 +13,6 @@ from typing import Any
 import cv2
 import numpy as np
 from numpy.typing import NDArray
-from scipy.special import ndtri, pdtr, pdtrc
 
 from conespot.render.fixed_pattern import unevenness
 from conespot.scene.emva import Emva
@@ -124,6 +123,8 @@ def _inverted(mean: NDArray[np.float32], normal: NDArray[np.float32], near: NDAr
 @functools.cache
 def _thresholds() -> NDArray[np.float32]:
     """The largest deviate that stands for at most k electrons, for means of up to `_EXACT_BELOW` `[means, k]`."""
+    from scipy.special import ndtri, pdtr, pdtrc  # every process of a campaign would wait for it
+
     octaves = math.log2(_EXACT_BELOW) - _FAINTEST
     means = 2.0 ** (_FAINTEST + np.arange(math.ceil(octaves * _PER_OCTAVE) + 2)[:, None] / _PER_OCTAVE)
     counts = np.arange(100)

@@ -15,7 +15,6 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.special import ndtr
 
 from conespot.localize.model.profile import Profile
 
@@ -112,6 +111,8 @@ def _ladder(profile: Profile, w: Array, sigma: Array, orders: range) -> Array:
 
 def _steps(t: Array, highest: int, lowest: int) -> dict[int, Array]:
     """N_n(t) for n from -`lowest` to `highest`."""
+    from scipy.special import ndtr  # every process of a campaign would wait for it
+
     near = np.flatnonzero(t < _FAR)
     phi, whole = np.zeros_like(t), np.ones_like(t)
     phi[near] = np.exp(-0.5 * np.square(t[near])) / math.sqrt(2.0 * math.pi)

@@ -13,7 +13,7 @@ pytestmark = pytest.mark.slow
 TEXT = """\
 scene: {preset: paper-code, camera: {resolution: 300}}
 trajectory: random
-poses: 4
+poses: 2
 samples: 16
 localizers: [paper]
 sweep:

@@ -58,7 +58,7 @@ def shadowed(tmp_path):
     for name in ("power_sweep", "paper-code", "helix"):
         (folder / name).mkdir()
     (folder / "c.yaml").write_text(TEXT)
-    (folder / "here.yaml").write_text("kind: local\nworkers: 2\n")
+    (folder / "here.yaml").write_text("kind: local\nworkers: 1\n")
     return folder
 
 
@@ -69,7 +69,7 @@ def test_files_and_folders_of_the_working_folder_hide_no_module_preset_or_campai
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("where", [("--workers", "2"), ("--profile", "here.yaml")], ids=["pool", "Dask"])
+@pytest.mark.parametrize("where", [("--workers", "1"), ("--profile", "here.yaml")], ids=["pool", "Dask"])
 def test_workers_import_nothing_from_the_working_folder(shadowed, script, where):
     command = [sys.executable, str(script), "run", "c.yaml", *where, "--out", "r"]
     done = subprocess.run(command, cwd=shadowed, capture_output=True, text=True, timeout=300)

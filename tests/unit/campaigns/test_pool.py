@@ -2,6 +2,8 @@
 
 import os
 import signal
+import subprocess
+import sys
 import time
 import warnings
 
@@ -183,3 +185,9 @@ def test_the_environment_is_as_it_was(plan, tmp_path, monkeypatch):
     assert os.environ["OMP_NUM_THREADS"] == "7"
     assert "MKL_NUM_THREADS" not in os.environ
     assert signal.pthread_sigmask(signal.SIG_BLOCK, set()) == set()
+
+
+def test_a_plan_reaches_its_worker_without_what_only_some_poses_need():
+    code = "import sys, conespot.campaigns.plan, conespot.campaigns.worker; print(sys.modules.keys() & set(sys.argv))"
+    command = [sys.executable, "-c", code, "scipy", "pandas", "matplotlib", "mitsuba"]
+    assert subprocess.run(command, capture_output=True, text=True).stdout == "set()\n"
