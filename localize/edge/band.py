@@ -113,7 +113,7 @@ class BandFit(EdgeFit):
             light, rows = lights[c]
             rows = rows[order] if softer is None else np.concatenate([rows[order], softer[None]])
             channels.append(copy(channel))
-            channels[-1].evaluate(self.seen.irradiance, light, rows)
+            channels[-1].evaluate(self.seen.irradiance, light, rows, lights.odds[c] if lights.odds else None)
         if softer is not None:
             names.append("edge")
         prior = np.pad(self.prior, ((0, 0), (0, len(names))))
@@ -171,12 +171,14 @@ def fit_band(
     pitch = nominal.camera.pixel_pitch * side
     shed = Irradiance(sight, band.pixels, side, estimate, knowns, np.ones(len(band.pixels), bool))
     lights = shed(estimate)
+    each = 3 if lights.odds else 2  # quantities of a strip
     if before is None:
-        usual = np.array([EDGE.level, EDGE.slope_per_mm * pitch])
+        usual = np.array([EDGE.level, EDGE.slope_per_mm * pitch, EDGE.level])[:each]
         begin = [(gain, usual, told) for gain, told in _first_gains(frame, estimate, band, irradiance, lights)]
     else:
-        begin = [(c.gain, c.spread * [1.0, side / math.sqrt(c.pixels)], c.told) for c in before.channels]
-    smallest = np.array([EDGE.smallest, EDGE.smallest / (stage.inner + stage.outer)])
+        per_bin = np.array([1.0, side / math.sqrt(before.channels[0].pixels), 1.0])[:each]
+        begin = [(c.gain, c.spread * per_bin, c.told) for c in before.channels]
+    smallest = np.array([EDGE.smallest, EDGE.smallest / (stage.inner + stage.outer), EDGE.smallest])[:each]
     channels = [
         Nuisances(shown, band.strips, noise, side**2, gain, spread, smallest, told=told)
         for shown, (gain, spread, told) in zip(band.shown, begin, strict=True)
@@ -228,7 +230,7 @@ def _equations(
     information, gradient = pj.T @ pj, -pj.T @ pr
     size, parts = len(gradient), []
     for c, channel in enumerate(channels):
-        channel.evaluate(irradiance, *lights[c])
+        channel.evaluate(irradiance, *lights[c], lights.odds[c] if lights.odds else None)
         part = channel.eliminated(size)
         reduced = reduction(part.information, size)
         parts.append(part)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,6 +12,7 @@ from conespot.localize.edge.settings import EDGE
 from conespot.localize.edge.strips import Eliminated, Strips, strip_scores
 from conespot.localize.model.noise import NoiseModel
 from conespot.localize.model.residual import follows, log_residuals, rest, rms, student_weights
+from conespot.localize.model.solve import inverse
 from conespot.localize.model.view import Shown
 
 Array = NDArray[np.float64]
@@ -26,19 +27,26 @@ class Nuisances:
     noise: NoiseModel
     pixels: int  #: in a bin
     gain: float  #: log of the spotlights' intensity over the ambient irradiance
-    spread: Array  #: prior sigma of levels and slopes `[2]`
-    smallest: Array  #: `[2]`
+    spread: Array  #: prior sigma of levels and slopes, and of the odds of deep light where there is any `[2 or 3]`
+    smallest: Array  #: `[2 or 3]`
     level: float = math.nan  #: log albedo of all strips
-    slow: Array = field(default_factory=lambda: np.zeros(0))  #: slopes that vary slowly around the outlines
-    slow_spread: float = 0.0  #: and their prior sigma
+    slow: Array = field(default_factory=lambda: np.zeros(0))  #: slopes, and more, that vary slowly around the outlines
+    slow_spread: float = 0.0  #: prior sigma of those slopes
+    slow_level: float = EDGE.level  #: and of levels and odds
     told: tuple[float, float] | None = None  #: what tells the gain beside the band, and its sigma
-    levels: Array = field(default_factory=lambda: np.zeros((0, 2)))  #: of each strip beyond it, and slope `[S, 2]`
+    #: of each strip beyond it, slope, and odds `[S, 2 or 3]`
+    levels: Array = field(default_factory=lambda: np.zeros((0, 2)))
     white: float = EDGE.white  #: what residuals scatter beyond the sensor's noise
 
-    def evaluate(self, irradiance: Array, light: Array, rows: Array) -> None:
-        """Residuals, weights and Jacobian where the spotlights' light is `light` `[N]` with derivatives `rows`."""
+    def evaluate(self, irradiance: Array, light: Array, rows: Array, odds: Array | None) -> None:
+        """Residuals, weights and Jacobian where the spotlights' light is `light` `[N]` with derivatives `rows`.
+
+        Of light from under the retina `odds` `[N]` is its derivative by the logarithm of that one's.
+        """
         g, shown = math.exp(self.gain), self.shown
         incident = irradiance + g * light
+        if odds is not None:
+            self.strips = replace(self.strips, odds=g / incident * odds)
         brightness = np.exp(shown.template) * incident
         if math.isnan(self.level):
             self._begin(brightness)
@@ -71,14 +79,16 @@ class Nuisances:
         overall = max(float(ratio.sum() / max(number.sum(), 1.0)), 1e-9)
         mean = np.where(number > 0, ratio / np.maximum(number, 1.0), overall)
         self.level = math.log(overall)
-        self.levels = np.stack([np.log(np.clip(mean / overall, 0.05, 20.0)), np.zeros(len(mean))], axis=1)
+        self.levels = np.zeros((len(mean), len(self.spread)))
+        self.levels[:, 0] = np.log(np.clip(mean / overall, 0.05, 20.0))
         self.slow, self.slow_spread = np.zeros(len(self.strips.slow)), float(self.spread[1])
 
     @property
     def precision(self) -> Array:
         """Prior precision of gain, level and slow slopes."""
         gain = 1e-9 if self.told is None else self.told[1] ** -2
-        return np.concatenate([[gain, 1e-9], np.full(len(self.slow), self.slow_spread**-2)])
+        spreads = [self.slow_spread] if self.strips.odds is None else [self.slow_spread, *2 * [self.slow_level]]
+        return np.concatenate([[gain, 1e-9], np.repeat(np.array(spreads) ** -2, len(self.slow) // len(spreads))])
 
     def eliminated(self, size: int) -> Eliminated:
         """The normal equations of `size` shared parameters, gain, level and slow slopes, the strips' own eliminated."""
@@ -106,7 +116,22 @@ class Nuisances:
         found = np.sqrt(np.square(self.levels).sum(axis=0) / np.maximum(known, 1.0))
         self.spread = np.clip(found, self.smallest, EDGE.widest * self.spread)
         # albedo has no direction: across the outline it changes as much as along
-        self.slow_spread = max(self.strips.slow_gradient(self.levels[:, 0]), float(self.smallest[1]))
+        levels = self.levels[:, 0]
+        if self.strips.odds is not None:
+            levels = levels + self._learn_slow_levels(part) @ self.strips.waves
+            # nor do a strip's own bins tell its slope where the step is low; and odds vary as the albedo does
+            self.spread[1:] = np.maximum(self.spread[1:], [self.strips.gradient(levels), self.spread[0]])
+        self.slow_spread = max(self.strips.slow_gradient(levels), float(self.smallest[1]))
+
+    def _learn_slow_levels(self, part: Eliminated) -> Array:
+        """The levels that vary slowly `[5 T]`, once they have told how much they do (MacKay 1992)."""
+        count = len(self.strips.waves)
+        slow = self.slow[count : 2 * count]
+        first = len(part.gradient) - 2 * count
+        variance = np.diag(inverse(part.information))[first : first + count]
+        known = max(float(np.sum(np.maximum(1.0 - variance / self.slow_level**2, 0.0))), 1.0)
+        self.slow_level = float(np.clip(np.linalg.norm(slow) / math.sqrt(known), self.smallest[0], EDGE.level))
+        return slow
 
 
 def gain_over(shown: Shown, irradiance: Array, light: Array, offset: Array, around: float) -> float:

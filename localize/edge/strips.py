@@ -24,6 +24,9 @@ class Strips:
     offset: Array  #: distance of each bin from the outline, positive outside `[N]` [bins]
     first: NDArray[np.intp]  #: each strip's first bin `[S]`
     turns: tuple[slice, ...]  #: the strips of each outline, in order around it
+    #: how the log light changes with the log odds of the light from under the retina `[N]`, where there is any: a strip
+    #: has odds of its own, since what lies before the pigment reflects and what lies behind it are not one albedo
+    odds: Array | None = None
 
     @property
     def count(self) -> int:
@@ -34,9 +37,30 @@ class Strips:
         """Sums over the strips `[..., S]` of values of the bins `[..., N]`."""
         return np.asarray(np.add.reduceat(values, self.first, axis=-1))
 
-    @cached_property
+    @property
     def slow(self) -> Array:
-        """Slopes that vary with harmonics 0 to 2 around each outline, as albedo at each bin `[5 T, N]`: the pose's."""
+        """What varies with harmonics 0 to 2 around each outline, the pose's, at each bin: slopes, levels and odds.
+
+        `[5 T, N]`, and with odds `[15 T, N]`. Without them a step in the light is so high that what a prior of strips
+        which know nothing of each other leaves of smooth levels moves no edge.
+        """
+        if self.odds is None:
+            return self._slow_slopes
+        levels = self.waves[:, self.index]
+        return np.concatenate([self._slow_slopes, levels, levels * self.odds])
+
+    @cached_property
+    def _slow_slopes(self) -> Array:
+        return np.asarray(self.waves[:, self.index] * self.offset)
+
+    def gradient(self, levels: Array) -> float:
+        """Rms by which levels `[S]` of width `WIDTH` change along the outlines [1/bin]."""
+        steps = np.concatenate([np.diff(levels[turn]) for turn in self.turns])
+        return float(np.sqrt(np.mean(np.square(steps)))) / WIDTH
+
+    @cached_property
+    def waves(self) -> Array:
+        """Harmonics 0 to 2 around each outline at every strip `[5 T, S]`."""
         waves = np.zeros((5 * len(self.turns), self.count))
         for number, turn in enumerate(self.turns):
             angle = np.arange(turn.stop - turn.start) * (2.0 * np.pi / (turn.stop - turn.start))
@@ -44,7 +68,7 @@ class Strips:
             for m in (1, 2):
                 waves[5 * number + 2 * m - 1, turn] = np.cos(m * angle)
                 waves[5 * number + 2 * m, turn] = np.sin(m * angle)
-        return np.asarray(waves[:, self.index] * self.offset)
+        return waves
 
     def slow_gradient(self, levels: Array) -> float:
         """Rms by which levels `[S]` of width `WIDTH` change slowly along the outlines, of one wave [1/bin]."""
@@ -57,27 +81,28 @@ class Strips:
         return float(np.sqrt(np.mean(found)))
 
     def log_albedo(self, levels: Array) -> Array:
-        """Level plus slope `[S, 2]` at each bin `[N]`."""
-        return np.asarray(levels[self.index, 0] + levels[self.index, 1] * self.offset)
+        """What the strips' own `[S, 2 or 3]`, level, slope and odds, do to the log light of each bin `[N]`."""
+        found = levels[self.index, 0] + levels[self.index, 1] * self.offset
+        return np.asarray(found if self.odds is None else found + levels[self.index, 2] * self.odds)
 
 
 @dataclass(frozen=True)
 class Eliminated:
-    """Normal equations with every strip's level and slope eliminated."""
+    """Normal equations with every strip's level and slope, and its odds if it has any, eliminated."""
 
     information: Array  #: `[P, P]`
     gradient: Array  #: `[P]`
-    start: Array  #: levels and slopes without a step `[S, 2]`
-    gain: Array  #: and how the parameters change them `[S, 2, P]`
-    variance: Array  #: of levels and slopes `[S, 2]`
+    start: Array  #: levels, slopes and odds without a step `[S, 2 or 3]`
+    gain: Array  #: and how the parameters change them `[S, 2 or 3, P]`
+    variance: Array  #: of levels, slopes and odds `[S, 2 or 3]`
 
     def levels(self, step: Array) -> Array:
-        """Level and slope of every strip `[S, 2]` after `step` `[P]`."""
+        """Level, slope and odds of every strip `[S, 2 or 3]` after `step` `[P]`."""
         return np.asarray(self.start - self.gain @ step)
 
     @classmethod
     def of(cls, strips: Strips, jacobian: Array, data: Array, weights: Array, spread: Array) -> Eliminated:
-        """From a Jacobian `[P, N]`, data and weights `[N]`; `spread` `[2]` is the prior sigma of level and slope."""
+        """From a Jacobian `[P, N]`, data and weights `[N]`; `spread` `[2 or 3]`: prior sigmas of the strips' own."""
         weighted = np.concatenate([jacobian, data[None]]) * weights
         right, solved, variance = _strip_equations(strips, weighted, weights, spread)
         cross = np.tensordot(right, solved, ([0, 2], [0, 2]))
@@ -93,7 +118,17 @@ class Eliminated:
 
 
 def _strip_equations(strips: Strips, weighted: Array, weights: Array, spread: Array) -> tuple[Array, Array, Array]:
-    """Sums of weighted columns `[2, P, S]`, the same solved for level and slope, and those' variances `[S, 2]`."""
+    """Sums of weighted columns `[2, P, S]`, the same solved for level and slope, and those' variances `[S, 2]`.
+
+    With odds of their own strips have three of all.
+    """
+    if strips.odds is not None:
+        own = np.stack([np.ones_like(strips.offset), strips.offset, strips.odds])
+        system = strips.sums(own * (weights * own)[:, None]).transpose(2, 0, 1) + np.diag(spread**-2)
+        right = np.stack([strips.sums(weighted * column) for column in own])
+        covariance = np.linalg.inv(system)
+        solved = np.einsum("sij,jps->ips", covariance, right)
+        return right, solved, np.einsum("sii->si", covariance)
     wo = weights * strips.offset
     a, b, d = strips.sums(np.stack([weights, wo, wo * strips.offset]))
     a, d = a + spread[0] ** -2, d + spread[1] ** -2
@@ -106,9 +141,9 @@ def _strip_equations(strips: Strips, weighted: Array, weights: Array, spread: Ar
 def strip_scores(
     strips: Strips, jacobian: Array, residual: Array, weights: Array, levels: Array, spread: Array
 ) -> tuple[Array, Array]:
-    """Each strip's own gradient `[S, P]` and information `[S, P, P]`, its level and slope eliminated.
+    """Each strip's own gradient `[S, P]` and information `[S, P, P]`, its level, slope and odds eliminated.
 
-    `levels` `[S, 2]` are how far the strips' level and slope are off their prior's mean.
+    `levels` `[S, 2 or 3]` are how far those are off their prior's mean.
     """
     weighted = np.concatenate([jacobian, (residual + strips.log_albedo(levels))[None]]) * weights
     right, solved, _ = _strip_equations(strips, weighted, weights, spread)

@@ -23,6 +23,8 @@ class Lights:
     """Irradiance on bins, and its derivatives by pose and free quantities, channel by channel."""
 
     each: tuple[tuple[Array, Array], ...]  #: `[N]` and `[P, N]`; one for all channels where they see the same
+    #: and by the log odds of light from under the retina `[N]`, where there is any
+    odds: tuple[Array, ...] = ()
 
     def __getitem__(self, channel: int) -> tuple[Array, Array]:
         """A channel's irradiance `[N]` and its derivatives `[P, N]`."""
@@ -60,11 +62,20 @@ class Irradiance:
         moving = sum(each.changes in ("sight", "glow") for each in free)
         sharp = Light(local[0], local[1][: estimate.pose_size + len(free) - moving])
         lights = self._glow.light(estimate, free, sharp)
-        each = zip(deep.shares.tolist(), lights, strict=True)
-        return Lights(tuple(self._mixed(local, light, share, estimate, free) for share, light in each))
+        shares = deep.shares.tolist()
+        # the share's odds against the local light are what is known to a factor
+        odds = [share * (1.0 - share) * (light.value - local[0]) for share, light in zip(shares, lights, strict=True)]
+        each = zip(lights, shares, odds, strict=True)
+        return Lights(tuple(self._mixed(local, *one, estimate, free) for one in each), tuple(odds))
 
     def _mixed(
-        self, local: tuple[Array, Array], deep: DeepLight, share: float, estimate: Estimate, free: tuple[Quantity, ...]
+        self,
+        local: tuple[Array, Array],
+        deep: DeepLight,
+        share: float,
+        odds: Array,
+        estimate: Estimate,
+        free: tuple[Quantity, ...],
     ) -> tuple[Array, Array]:
         """A channel's irradiance of which a `share` is deep, and its derivatives."""
         value, rows = local
@@ -74,11 +85,7 @@ class Irradiance:
             sides = _sides(estimate, each, self._pixels, self._side)
             by_pose.append(light_by_surface(here, self._sight, estimate.pose, sides, each.step)[None])
         mixed = (1.0 - share) * rows + share * np.nan_to_num(np.concatenate(by_pose))
-        # the share's odds against the local light are what is known to a factor
-        by_glow = {
-            "deep_amount": share * (1.0 - share) * (deep.value - value),
-            "deep_length": share * deep.by_length,
-        }
+        by_glow = {"deep_amount": odds, "deep_length": share * deep.by_length}
         own = [by_glow[each.name][None] for each in free if each.changes == "glow"]
         return (1.0 - share) * value + share * deep.value, np.concatenate([mixed, *own])
 
