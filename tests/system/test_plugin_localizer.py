@@ -1,5 +1,6 @@
 """Localizers of another installed distribution: listed, used in a campaign, and harmless when they break."""
 
+import functools
 import os
 import subprocess
 import sys
@@ -53,6 +54,13 @@ from conespot.campaigns.command import main
 writing.plan_figures = lambda run, boxes: ([], 0)
 sys.exit(main())
 """
+#: exit codes for several files
+VALIDATE = """\
+import sys
+from conespot.campaigns.command import main
+
+print(*(int(main(["validate", name])) for name in sys.argv[1:]))
+"""
 NAMES = ["brightest", "told", "seer", "raises", "writes", "answers_a_word", "answers_nan", "leaves"]
 
 
@@ -72,14 +80,15 @@ def installed(tmp_path_factory):
     return site
 
 
+def python(code, *arguments, installed, cwd):
+    environment = {**os.environ, "PYTHONPATH": str(installed)}
+    command = [sys.executable, "-c", code, *map(str, arguments)]
+    return subprocess.run(command, cwd=cwd, env=environment, capture_output=True, text=True, timeout=120)
+
+
 @pytest.fixture
 def campaign(installed, tmp_path):
-    def run(*arguments):
-        environment = {**os.environ, "PYTHONPATH": str(installed)}
-        command = [sys.executable, "-c", UNDRAWN, *map(str, arguments)]
-        return subprocess.run(command, cwd=tmp_path, env=environment, capture_output=True, text=True, timeout=120)
-
-    return run
+    return functools.partial(python, UNDRAWN, installed=installed, cwd=tmp_path)
 
 
 def test_they_are_listed_with_their_words_and_what_is_wrong_with_them(campaign):
@@ -117,17 +126,15 @@ def test_a_campaign_uses_them_and_what_breaks_is_a_failure_row(campaign, tmp_pat
     assert '"told": {"threshold": "none (a guess)"' in (tmp_path / "run" / "cases.jsonl").read_text()
 
 
-@pytest.mark.parametrize(
-    ("name", "says"),
-    [
-        ("gone", "localizer 'gone' (no_such_module:f of beacon 1.0) cannot be loaded: ModuleNotFoundError"),
-        ("none", "localizer 'none' (beacon:none of beacon 1.0) is no conespot.localize.localizer.Localizer"),
-        ("brightes", "unknown localizer 'brightes'; did you mean 'brightest'?"),
-    ],
-)
-def test_one_that_cannot_be_used_is_refused_in_a_sentence_with_its_line(campaign, tmp_path, name, says):
-    (tmp_path / "c.yaml").write_text(f"scene: paper\nlocalizers:\n- {name}\n")
-    done = campaign("validate", "c.yaml")
-    assert done.returncode == 2
-    assert done.stderr.startswith(f"campaign: c.yaml:3: localizers.0: {says}")
-    assert len(done.stderr.splitlines()) == 1
+def test_one_that_cannot_be_used_is_refused_in_a_sentence_with_its_line(installed, tmp_path):
+    refused = {
+        "gone": "localizer 'gone' (no_such_module:f of beacon 1.0) cannot be loaded: ModuleNotFoundError",
+        "none": "localizer 'none' (beacon:none of beacon 1.0) is no conespot.localize.localizer.Localizer",
+        "brightes": "unknown localizer 'brightes'; did you mean 'brightest'?",
+    }
+    for name in refused:
+        (tmp_path / f"{name}.yaml").write_text(f"scene: paper\nlocalizers:\n- {name}\n")
+    done = python(VALIDATE, *(f"{name}.yaml" for name in refused), installed=installed, cwd=tmp_path)
+    assert done.stdout == "2 2 2\n"
+    for said, (name, says) in zip(done.stderr.splitlines(), refused.items(), strict=True):
+        assert said.startswith(f"campaign: {name}.yaml:3: localizers.0: {says}")
