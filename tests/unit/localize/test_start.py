@@ -21,7 +21,7 @@ from conespot.scene.scene import Scene
 from conespot.scene.sensor import Linear
 from conespot.scene.spotlights import spotlight_axes
 
-SIDE = 600
+SIDE, RAYS = 600, 2  # pixels a side, and rays a side of each
 DISC = (3.4, 0.6)  # [mm]
 BEAMS = {"hard": HardBeam(), "soft": CyclesBeam(), "half soft": CyclesBeam(blend=0.3), "linear": LinearBeam()}
 
@@ -31,9 +31,9 @@ def scene_of(beam="hard", spotlights="single"):
 
 
 @lru_cache
-def wall(rays=3):
+def wall():
     scene = scene_of()
-    at = (np.arange(SIDE * rays) + 0.5) / rays
+    at = (np.arange(SIDE * RAYS) + 0.5) / RAYS
     sight = scene.camera.rays(np.stack(np.meshgrid(at, at), axis=-1)).directions
     return scene.surface.intersect(scene.eye, scene.camera.centre, sight)
 
@@ -42,7 +42,7 @@ def wall(rays=3):
 def albedo(disc):
     """A mottled retina with a disc of `disc` times its albedo, somewhat taller than wide and with a soft rim."""
     points = wall()
-    mottle = cv2.GaussianBlur(np.random.default_rng(3).standard_normal(points.shape[:2]), (0, 0), 12.0)
+    mottle = cv2.GaussianBlur(np.random.default_rng(3).standard_normal(points.shape[:2]), (0, 0), 4.0 * RAYS)
     reflect = np.exp(0.15 * mottle / mottle.std())
     off = np.hypot((points[..., 0] - DISC[0]) / 0.86, (points[..., 1] - DISC[1]) / 1.02)
     inside = 1.0 / (1.0 + np.exp((off - 1.0) / 0.03))
@@ -63,7 +63,7 @@ def frame(scene, pose, disc=1.0, gain=45.0, seed=0):
         normal = (scene.eye.centre - points) / scene.eye.radius
         light = profile * -np.sum(normal * to, axis=-1) / d**3
         light *= gain / light.max()
-    pixels = (albedo(disc) * (up + light)).reshape(SIDE, 3, SIDE, 3).mean(axis=(1, 3))
+    pixels = (albedo(disc) * (up + light)).reshape(SIDE, RAYS, SIDE, RAYS).mean(axis=(1, 3))
     rng = np.random.default_rng(seed)
     # the brightest of both is exposed to 80 % of white
     electrons = pixels * min(200.0, 9000.0 / pixels.max())
