@@ -97,6 +97,15 @@ class Tremor(_Exposed):
         fastest = 2.0 * math.pi * (self.frequency + self.bandwidth / 2.0) * furthest
         return min(2.0 * furthest, fastest * exposure / 2.0)
 
+    def smear(self, exposure: float) -> float:
+        """Standard deviation along an axis of the tip's places during an `exposure` [s], in the mean over time [mm].
+
+        A sinusoid of rms a and angular frequency w has in a window T the mean variance a^2 (1 - sinc^2(w T / 2)).
+        """
+        low, high = (self.frequency + sign * self.bandwidth / 2.0 for sign in (-1.0, 1.0))
+        rates = np.linspace(low, high, _WAVES)
+        return self.rms * math.sqrt(float(np.mean(1.0 - np.square(np.sinc(rates * exposure)))) / 3.0)
+
     def displacement(self, times: ArrayLike, seed: int = 0) -> Array:
         """How far the tip is off its planned place `[..., 3]` [mm] at times `[...]` [s]."""
         rates, phases = _waves(self.frequency, self.bandwidth, seed)

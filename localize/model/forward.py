@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 from conespot.localize.model.profile import Profile
 from conespot.localize.model.rise import Rise
 from conespot.localize.model.sight import Sight
-from conespot.localize.model.smooth import Smooth, smoothed
+from conespot.localize.model.smooth import Smooth
 from conespot.localize.model.spread import Spread
 from conespot.scene.pose import Pose, tangents
 from conespot.scene.scene import Scene
@@ -138,11 +138,12 @@ def _averaging(
         return lambda of: Smooth(*of.mean(sharp, px, py), of.curvature(sharp, px, py) if curved else nothing, nothing)
     widths = spread.widths(rise)
     w, skew = spread.bent(rise, widths, profile, radius)
-    gaussian, disc = widths.gaussian_and_disc
-    variance, reach = gaussian * np.square(rise.stretch), disc * rise.stretch
+    # of what is sought, less than a pixel's own variance
+    least = (np.square(rise.gx) + np.square(rise.gy)) / 12.0 if spread.sought else 0.0
+    over = widths.average(least, rise.stretch)
 
     def average(of: Profile) -> Smooth:
-        found = smoothed(of, w, px, py, variance, reach)
+        found = over(of, w, px, py)
         return replace(found, mean=found.mean + skew * rise.stretch**3 * found.third)
 
     return average

@@ -8,6 +8,7 @@ from typing import Literal
 
 from conespot.localize.model.deep import Deep
 from conespot.localize.model.quantity import QUANTITIES, Quantity
+from conespot.localize.model.smear import smear_sigma
 from conespot.scene.document import InputError
 from conespot.scene.scene import Scene
 
@@ -17,7 +18,7 @@ RCM_SIGMA_MM = 0.05
 #: how well the amount of a scene's deep light and how far it goes are known, as logarithms: scattering coefficients of
 #: tissue are known to a factor of two
 DEEP_SIGMA = math.log(2.0)
-_USUAL = ("deep_amount_sigma", "deep_length_sigma")
+_USUAL = ("smear_sigma_mm", "deep_amount_sigma", "deep_length_sigma")
 
 
 @dataclass(frozen=True)
@@ -34,6 +35,9 @@ class Knowns:
     #: of the lens' residual blur, with what else spreads the image alike: the square of its width may be off by the
     #: square of this. Doubted, it is as the scene says until a frame contradicts that, and then free
     blur_sigma_mm: float | Literal["doubted"] | None = "doubted"
+    #: root mean square way of the tip along an axis in one exposure, about its middle, if it trembles; usual is what
+    #: the scene's tremor has
+    smear_sigma_mm: float | Literal["usual"] | None = "usual"
     eye_radius_sigma_mm: float | None = 0.0
     camera_height_sigma_mm: float | None = 0.0
     #: of each of the retina's semi-axes: `scene.population.SEMI_AXES_SIGMA_MM` about the mean eye for an unknown one
@@ -55,8 +59,9 @@ class Knowns:
 
     def within(self, scene: Scene) -> Knowns:
         """The same with what is usual in such a scene."""
-        usual = 0.0 if Deep.of(scene) is None else DEEP_SIGMA
-        return replace(self, **{name: usual for name in _USUAL if getattr(self, name) == "usual"})
+        deep = 0.0 if Deep.of(scene) is None else DEEP_SIGMA
+        usual = zip(_USUAL, (smear_sigma(scene), deep, deep), strict=True)
+        return replace(self, **{name: sigma for name, sigma in usual if getattr(self, name) == "usual"})
 
     @property
     def free(self) -> tuple[Quantity, ...]:

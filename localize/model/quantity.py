@@ -11,8 +11,10 @@ from dataclasses import dataclass
 from typing import Literal
 
 from conespot.localize.model.point_spread import lens_variance
+from conespot.localize.model.smear import ENTRIES, way_covariance, with_way
 from conespot.scene.document import InputError
 from conespot.scene.lens import Lens
+from conespot.scene.motion import Tremor
 from conespot.scene.point_spread import WIDEST, GaussianSpread
 from conespot.scene.retina import Fundus, Spread
 from conespot.scene.scene import Scene
@@ -91,6 +93,31 @@ def _with_blur(scene: Scene, new: float) -> Scene:
     return scene.model_copy(update={"camera": scene.camera.model_copy(update={"lens": lens})})
 
 
+def _way(entry: tuple[int, int]) -> Quantity:
+    """An entry of the covariance of the tip's places during the exposure [mm^2].
+
+    Of Gaussian velocities of deviation s along each axis, the entries of v v^T have the mean s^2 on the diagonal and
+    variances of 2 s^4 there and s^4 beside it, and are not correlated (L. Isserlis, Biometrika 12, 1918).
+    """
+    name = "smear_" + "".join("xyz"[axis] for axis in entry)
+
+    def read(scene: Scene) -> float | None:
+        return float(way_covariance(scene)[entry]) if isinstance(scene.motion, Tremor) else None
+
+    return Quantity(
+        name,
+        read,
+        write=lambda scene, new: with_way(scene, entry, new),
+        changes="spread",
+        step=1e-6,
+        known="smear_sigma_mm",
+        per_unit=2.0**0.25 if entry[0] == entry[1] else 1.0,
+        unit="mm",
+        power=2,
+        remedy="give it a motion of kind tremor",
+    )
+
+
 #: in the order in which they join the parameters of a fit
 QUANTITIES = (
     Quantity(
@@ -124,6 +151,7 @@ QUANTITIES = (
         unit="mm",
         power=2,
     ),
+    *map(_way, ENTRIES),
     Quantity(
         name="eye_radius",
         read=lambda scene: scene.eye.radius,

@@ -46,16 +46,22 @@ def smoothed(profile: Profile, w: Array, px: Array, py: Array, variance: Array, 
     right to 0.4 % of it, under a Gaussian to 0.04 %.
     """
     if not np.any(disc):
-        return _smoothed(profile, w, px, py, variance)
-    parts = [
-        (weight, _smoothed(profile, w + place * disc, px, py, variance + np.square(_WIDTH * disc)))
-        for place, weight in _DISC
-    ]
-    return Smooth(*(sum(weight * vars(part)[name] for weight, part in parts) for name in vars(parts[0][1])))
+        return Smooth(*_smoothed(profile, w, px, py, variance))
+    found = np.zeros((4, len(w)))
+    for place, weight in _DISC:
+        found += weight * _smoothed(profile, w + place * disc, px, py, variance + np.square(_WIDTH * disc))
+    return Smooth(*found)
 
 
-def _smoothed(profile: Profile, w: Array, px: Array, py: Array, variance: Array) -> Smooth:
-    """The same without a disc."""
+def smeared(profile: Profile, w: Array, px: Array, py: Array, variance: Array, half: Array) -> Smooth:
+    """The same of an image spread by a Gaussian and an even way, from `half` before to `half` behind `[N]`: exact."""
+    half = np.maximum(half, 1e-3 * (px + py))
+    before, behind = (_smoothed(profile, w + sign * half, px, py, variance, 1) for sign in (1.0, -1.0))
+    return Smooth(*(before - behind) / (2.0 * half))
+
+
+def _smoothed(profile: Profile, w: Array, px: Array, py: Array, variance: Array, below: int = 0) -> Array:
+    """Mean and three derivatives `[4, N]` under a Gaussian, or as many orders `below` them."""
     box = (np.square(px) + np.square(py)) / 3.0
     # a pixel under a Gaussian as wide as half of it: its own variance and kurtosis are all of it that shows
     wide = variance > 3.0 * box
@@ -63,29 +69,29 @@ def _smoothed(profile: Profile, w: Array, px: Array, py: Array, variance: Array)
     if wide.any():
         at = np.flatnonzero(wide)
         sharpness = -(px[at] ** 4 + py[at] ** 4) * (2.0 / 15.0 / 24.0)
-        ladder = _ladder(profile, w[at], np.sqrt(variance[at] + box[at]), range(8))
+        ladder = _ladder(profile, w[at], np.sqrt(variance[at] + box[at]), range(-below, 8 - below))
         found[:, at] = ladder[:4] + sharpness * ladder[4:]
     if not wide.all():
         at = np.flatnonzero(~wide)
-        found[:, at] = _differences(profile, w[at], px[at], py[at], variance[at], box[at])
-    return Smooth(*found)
+        found[:, at] = _differences(profile, w[at], px[at], py[at], variance[at], box[at], below)
+    return found
 
 
-def _differences(profile: Profile, w: Array, px: Array, py: Array, variance: Array, box: Array) -> Array:
-    """Mean and three derivatives `[4, N]` as second differences over the pixel, near knots."""
+def _differences(profile: Profile, w: Array, px: Array, py: Array, variance: Array, box: Array, below: int) -> Array:
+    """The same as second differences over the pixel, near knots."""
     # away from the knots a cubic's mean is exact with the pixel's variance
     reach = px + py + _FAR * np.sqrt(variance + box)
     near = np.any(np.abs(w - profile.knots[:, None]) < reach, axis=0)
     found = np.zeros((4, len(w)))
     far = np.flatnonzero(~near)
-    found[:, far] = _ladder(profile, w[far], np.sqrt(variance[far] + box[far]), range(4))
+    found[:, far] = _ladder(profile, w[far], np.sqrt(variance[far] + box[far]), range(-below, 4 - below))
     at = np.flatnonzero(near)
     a, p, q = w[at], px[at], py[at]
     floor = np.maximum(1e-3 * np.maximum(p, q), 1e-9)
     p, q = np.maximum(p, floor), np.maximum(q, floor)
     sigma = np.maximum(np.sqrt(variance[at]), floor)
     for sign, corner in ((1.0, a + p + q), (-1.0, a + p - q), (-1.0, a - p + q), (1.0, a - p - q)):
-        found[:, at] += sign * _ladder(profile, corner, sigma, range(-2, 2)) / (4.0 * p * q)
+        found[:, at] += sign * _ladder(profile, corner, sigma, range(-2 - below, 2 - below)) / (4.0 * p * q)
     return found
 
 

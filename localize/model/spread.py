@@ -7,9 +7,8 @@ variable, and by half the variance times the second derivative.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from dataclasses import dataclass
-from typing import assert_never
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,7 +17,8 @@ from conespot.localize.model.point_spread import lens_variance
 from conespot.localize.model.profile import Profile
 from conespot.localize.model.rise import Rise
 from conespot.localize.model.sight import Sight
-from conespot.scene.motion import Tremor, Velocity, exposure_of
+from conespot.localize.model.smear import Smeared, way_covariance
+from conespot.localize.model.smooth import Smooth, smeared, smoothed
 from conespot.scene.pose import Pose
 from conespot.scene.scene import Scene
 
@@ -28,19 +28,8 @@ _FAR = 4.0
 _STEP = 0.01  # of the tip [mm], for second differences
 
 
-def way_covariance(scene: Scene) -> Array:
-    """Covariance `[3, 3]` [mm^2] of the tip's places during the exposure, as far as the scene tells.
-
-    Of a tremor it does not tell where the hand goes in this frame: that is sought as a blur.
-    """
-    match scene.motion:
-        case None | Tremor():
-            return np.zeros((3, 3))
-        case Velocity():
-            way = exposure_of(scene.motion, scene.sensor) * np.asarray(scene.motion.velocity)
-            return np.outer(way, way) / 12.0
-        case unknown:
-            assert_never(unknown)
+#: the means over pixels of a profile at variables `[N]` that rise by 2 px and 2 py along their sides
+Averaging = Callable[[Profile, Array, Array, Array], Smooth]
 
 
 @dataclass(frozen=True)
@@ -57,17 +46,34 @@ class Widths:
     def variance(self) -> Array:
         """All of it."""
         return np.asarray(self.lens + self.defocus + self.core + self.way + self.wall)
+        """All of it; below zero where a way that is being sought takes off more than the others have."""
+        return np.asarray(self.lens + self.defocus + self.core + self.way)
 
-    @property
-    def gaussian_and_disc(self) -> tuple[Array, Array]:
-        """Variance of a Gaussian and radius of a disc that together have this variance and its fourth cumulant `[N]`.
+    def average(self, least: Array | float, stretch: Array | float) -> Averaging:
+        """Means over pixels of a profile whose variable rises by `stretch` of the cosine, at centres `[N]`.
 
-        A disc's fourth cumulant is minus the square of its variance, that of a steady motion 1.2 times as much.
+        A motion is exact where nothing else but a Gaussian spreads the image. Other mixtures are a Gaussian and a disc
+        of the same variance and fourth cumulant: a disc's is minus the square of its variance, a steady motion's 1.2
+        times as much. What has less variance than `least` is continued in a straight line from there, as light is
+        linear in it: a way that is being sought takes off more than there is.
         """
-        whole = self.variance
-        disc = np.sqrt(np.square(self.defocus) + np.square(self.core) + 1.2 * np.square(self.way))
-        disc = np.minimum(disc, whole)
-        return whole - disc, 2.0 * np.sqrt(disc)
+        short = np.minimum(self.variance - least, 0.0)
+        whole = self.variance - short
+        way = np.maximum(self.way, 0.0)
+        straight = bool(np.any(way)) and not (np.any(self.defocus) or np.any(self.core))
+        own = way if straight else np.sqrt(np.square(self.defocus) + np.square(self.core) + 1.2 * np.square(way))
+        own = np.minimum(own, whole)
+        spread, reach = (smeared, np.sqrt(3.0 * own)) if straight else (smoothed, 2.0 * np.sqrt(own))
+
+        def over(profile: Profile, w: Array, px: Array, py: Array) -> Smooth:
+            found = spread(profile, w, px, py, (whole - own) * np.square(stretch), reach * stretch)
+            more = short * np.square(stretch) / 2.0
+            if not np.any(more):
+                return found
+            mean, slope = found.mean + more * found.curvature, found.slope + more * found.third
+            return replace(found, mean=mean, slope=slope)
+
+        return over
 
 
 @dataclass(frozen=True)
@@ -80,6 +86,7 @@ class Spread:
     way: Array | None  #: covariance of the tip's places `[3, 3]` [mm^2]; the needle goes on through the RCM
     needle: tuple[Array, float]  #: its axis `[3]`, and how far the tip is from the RCM [mm]
     wall: float  #: variance of a Gaussian on the wall [mm^2]: light that comes back beside where it fell
+    sought: bool  #: whether the way is being estimated, and may be no covariance yet
 
     @classmethod
     def of(cls, scene: Scene, sight: Sight, pose: Pose, wall: float = 0.0) -> Spread:
@@ -96,6 +103,7 @@ class Spread:
             way if np.any(way) else None,
             (pose.axis, float(np.linalg.norm(pose.apex - np.asarray(scene.instrument.rcm)))),
             wall,
+            isinstance(scene.motion, Smeared),
         )
 
     @property
@@ -112,7 +120,7 @@ class Spread:
             core = self.core * np.maximum(flat, 0.0)
         if self.way is not None:
             tip = self._by_tip(rise)
-            way = np.maximum(np.einsum("ij,jk,ik->i", tip, self.way, tip), 0.0)
+            way = np.einsum("ij,jk,ik->i", tip, self.way, tip)
         if self.wall:
             along = rise.along_wall
             wall = self.wall * np.einsum("ij,ij->i", along, along)
@@ -150,7 +158,7 @@ class Spread:
         the latter's factor. A step is where it is, and tells of the x that lead to it.
         """
         pixel = (np.square(rise.gx) + np.square(rise.gy)) / 12.0
-        whole = np.maximum(widths.variance + pixel, 1e-300)
+        whole = np.maximum(np.maximum(widths.variance, 0.0) + pixel, 1e-300)
         missing = (profile.knots[0] - rise.w) / rise.stretch
         step = profile.begins_with_a_step
         near = np.square(missing) < _FAR**2 * whole

@@ -119,7 +119,8 @@ def edge_width(estimate: Estimate) -> float:
         to = sight.points - estimate.pose.apex
         d = np.linalg.norm(to, axis=1)
         rise = Rise.of(sight, axis, to / d[:, None], d, estimate.profile)
-        squares.append(spread.widths(rise).variance / (np.square(rise.gx) + np.square(rise.gy)))
+        variance = np.maximum(spread.widths(rise).variance, 0.0)
+        squares.append(variance / (np.square(rise.gx) + np.square(rise.gy)))
     return float(np.sqrt(np.mean(np.concatenate(squares)))) if squares else 0.0
 
 

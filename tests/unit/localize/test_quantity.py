@@ -8,6 +8,7 @@ from conespot.localize import Knowns
 from conespot.localize.model.quantity import QUANTITIES
 from conespot.scene.beam import HardBeam
 from conespot.scene.document import InputError
+from conespot.scene.motion import Tremor
 from conespot.scene.retina import Fundus, Spread
 from conespot.scene.scene import Scene
 
@@ -26,7 +27,7 @@ def test_every_quantity_has_its_sigma_and_every_sigma_but_the_rcms_and_the_relie
 
 @pytest.mark.parametrize("each", QUANTITIES, ids=lambda each: each.name)
 def test_what_is_written_is_read(each):
-    scene = Scene(retina=Fundus(spread=Spread()))
+    scene = Scene(retina=Fundus(spread=Spread()), motion=Tremor(exposure=0.008))
     new = each.value(scene) + (-0.01 if each.changes == "beam" else 0.01)
     assert each.value(each.write(scene, new)) == pytest.approx(new, abs=1e-12)
     assert each.value(scene) != new

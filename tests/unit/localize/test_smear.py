@@ -1,0 +1,68 @@
+"""A tremor's smear: an exposure of which nobody tells where the hand went in it is fitted as one."""
+
+import numpy as np
+import pytest
+from photographs import AMBIENT, NOISE, PEAK, READ, WHITE, cast, scene_of, spotlight
+
+from conespot.localize import Knowns, locate
+from conespot.localize.model.quantity import QUANTITIES
+from conespot.localize.model.smear import smear_sigma, way_covariance
+from conespot.scene.beam import CyclesBeam, HardBeam
+from conespot.scene.motion import Tremor
+from conespot.scene.pose import Pose
+from conespot.scene.scene import Scene
+
+TIP, EXPOSURE = np.array([0.9, -0.6, 4.0]), 0.008
+TREMOR = Tremor(exposure=EXPOSURE)
+
+
+def smeared(scene, way, seed, parts=24, k=10):
+    """A frame of 12 bits over an even retina in which the tip goes straight along `way` [mm], TIP in its middle."""
+    shares = (np.arange(parts) + 0.5) / parts - 0.5
+    poses = [Pose.through(TIP + share * way, scene.instrument.rcm) for share in shares]
+    outlines = np.concatenate([scene.camera.project(scene.outline(pose, 0)) for pose in poses])
+    low, high = np.floor(outlines.min(axis=0)).astype(int) - 2, np.ceil(outlines.max(axis=0)).astype(int) + 2
+    x, y = (low[i] + (np.arange((high[i] - low[i]) * k) + 0.5) / k for i in (0, 1))
+    points = cast(scene, x, y)
+    light = sum(spotlight(scene, pose, points) for pose in poses)
+    light = light.reshape(high[1] - low[1], k, -1, k).mean(axis=(1, 3))
+    electrons = np.full(scene.camera.shape, AMBIENT)
+    electrons[low[1] : high[1], low[0] : high[0]] += PEAK * light / np.quantile(light, 0.998)
+    rng = np.random.default_rng(seed)
+    electrons = rng.poisson(electrons) + READ * rng.standard_normal(electrons.shape)
+    return np.clip(np.round(electrons / WHITE * 4095.0), 0, 4095).astype(np.uint16)
+
+
+def test_a_tremors_smear_is_what_its_way_scatters_in_the_mean():
+    ways = [TREMOR.sway(time, 0.02, seed=2) for time in np.arange(0.0, 60.0, 0.0731)]
+    scatter = np.mean([np.var(way, axis=0) for way in ways], axis=0)
+    np.testing.assert_allclose(scatter, TREMOR.smear(0.02) ** 2, rtol=0.1)
+    # short against its waves it is a steady velocity
+    speed = 2.0 * np.pi * TREMOR.rms / np.sqrt(3.0) * np.sqrt(81.0 + 4.0 / 12.0)
+    assert TREMOR.smear(1e-3) == pytest.approx(speed * 1e-3 / np.sqrt(12.0), rel=1e-3)
+
+
+def test_what_is_known_of_a_way_are_the_moments_of_a_gaussian_velocity():
+    scene = Scene(motion=TREMOR)
+    own = smear_sigma(scene)
+    ways = own * np.random.default_rng(1).standard_normal((200_000, 3))
+    known = Knowns().within(scene)
+    products = np.einsum("ki,kj->kij", ways, ways)
+    for each in (each for each in QUANTITIES if each.known == "smear_sigma_mm"):
+        i, j = ("xyz".index(axis) for axis in each.name[-2:])
+        assert each.value(scene) == pytest.approx(np.mean(products[:, i, j]), abs=0.02 * own**2)
+        assert known.sigma(each) == pytest.approx(np.std(products[:, i, j]), rel=0.02)
+        np.testing.assert_allclose(way_covariance(each.write(scene, 3e-4))[i, j], 3e-4)
+    assert not any(each.known == "smear_sigma_mm" for each in Knowns().within(Scene()).free)
+
+
+@pytest.mark.parametrize("beam", [HardBeam(), CyclesBeam()], ids=lambda beam: beam.words)
+def test_a_patch_that_smears_in_a_way_nobody_tells_is_measured_within_its_sigmas(beam):
+    scene = scene_of(beam, resolution=400)
+    told = scene.model_copy(update={"motion": TREMOR})
+    for seed, way in enumerate(([0.08, 0.0, 0.0], [0.0, 0.06, 0.05])):
+        found = locate(smeared(scene, np.array(way), seed), told, "photometric", noise=NOISE)
+        assert found, found.reason
+        off = found.apex_mm - TIP
+        assert np.linalg.norm(off) < 0.03
+        assert off @ np.linalg.solve(found.covariance[:3, :3], off) < 16.3  # 99.9 % of three dimensions
