@@ -58,6 +58,7 @@ class CalibrationSettings:
         half_angle_sigma_deg=0.003,
         softness_sigma=0.01,
         blur_sigma_mm=0.0,
+        core_sigma_mm=0.0,
         smear_sigma_mm=0.0,
         eye_radius_sigma_mm=0.01,
         camera_height_sigma_mm=0.03,

@@ -189,7 +189,7 @@ def fit_band(
             lights = shed(estimate)
         pr, pj = prior_rows(estimate, nominal, used)
         information, gradient, parts = _equations(channels, irradiance, lights, (pr, pj))
-        found = solved(information, gradient)
+        found = _within_bounds(information, gradient, estimate, knowns)
         if found is None:
             return LocalizationFailure(UNCERTAIN)
         step = limited(found, max(EDGE.longest_step_mm, EDGE.longest_step_bins * pitch))
@@ -217,6 +217,23 @@ def fit_band(
         doubt,
         Seen(sight, band.pixels, side, irradiance),
     )
+
+
+def _within_bounds(information: Array, gradient: Array, at: Estimate, knowns: Knowns) -> Array | None:
+    """The step `[P]` that solves the equations, with what is at its end held there; None if nothing solves them."""
+    kept = np.arange(len(gradient))
+    step = solved(information, gradient)
+    while step is not None:
+        held = [j for j, each in enumerate(knowns.free, start=at.pose_size) if at.blocked(each, float(step[j]))]
+        if not held:
+            break
+        kept = np.setdiff1d(kept, held)
+        part = solved(information[np.ix_(kept, kept)], gradient[kept])
+        if part is None:
+            return None
+        step = np.zeros(len(gradient))
+        step[kept] = part
+    return step
 
 
 def _equations(

@@ -73,7 +73,8 @@ def fit_edge(
             fit, start = found, found.estimate
             if not found.contradicted:
                 break
-            used = doubting
+            # one width tells that something spreads the image, two what it is
+            used = doubting = doubting.doubting_core if sharp else doubting
     assert fit is not None
     return fit
 

@@ -41,8 +41,7 @@ def contradicted(information: Array, gradient: Array, at: Estimate, doubted: Kno
     for j, each in enumerate(doubted.free, start=size):
         if each in knowns.free or not step[j] ** 2 > DOUBT.sigmas**2 * covariance[j, j]:
             continue
-        # what cannot be less, as a blur where there is none, is not contradicted by less
-        here = each.value(at.scene)
-        if each.value(each.write(at.scene, here + float(step[j]))) != here:
+        # what cannot be less is not contradicted by less
+        if not at.blocked(each, float(step[j])):
             return True
     return False

@@ -49,6 +49,11 @@ class Estimate:
         """The scene with a little more of each free quantity that spreads the image, and how much more."""
         return [(self.beside(each, each.step), each.step) for each in free if each.changes == "spread"]
 
+    def blocked(self, quantity: Quantity, step: float) -> bool:
+        """Whether a quantity is at an end that a step would leave: a blur where there is none cannot be less."""
+        here = quantity.value(self.scene)
+        return step != 0.0 and quantity.value(quantity.write(self.scene, here + step)) == here
+
     def moved(self, step: Array, free: tuple[Quantity, ...]) -> Estimate:
         """The estimate after `step`: pose parameters first, then the free quantities."""
         scene = self.scene

@@ -18,6 +18,9 @@ RCM_SIGMA_MM = 0.05
 #: how well the amount of a scene's deep light and how far it goes are known, as logarithms: scattering coefficients of
 #: tissue are known to a factor of two
 DEEP_SIGMA = math.log(2.0)
+#: diameters of fibres' cores that nobody told of
+CORE_SIGMA_MM = 0.1
+_DOUBTED = ("blur_sigma_mm", "core_sigma_mm")
 _USUAL = ("smear_sigma_mm", "deep_amount_sigma", "deep_length_sigma")
 
 
@@ -35,6 +38,8 @@ class Knowns:
     #: of the lens' residual blur, with what else spreads the image alike: the square of its width may be off by the
     #: square of this. Doubted, it is as the scene says until a frame contradicts that, and then free
     blur_sigma_mm: float | Literal["doubted"] | None = "doubted"
+    #: of the diameter of the core that the light leaves: its square may be off by the square of this
+    core_sigma_mm: float | Literal["doubted"] | None = "doubted"
     #: root mean square way of the tip along an axis in one exposure, about its middle, if it trembles; usual is what
     #: the scene's tremor has
     smear_sigma_mm: float | Literal["usual"] | None = "usual"
@@ -52,7 +57,7 @@ class Knowns:
 
     def __post_init__(self) -> None:
         for name, value in vars(self).items():
-            if value is None or (value == "usual" and name in _USUAL) or (value, name) == ("doubted", "blur_sigma_mm"):
+            if value is None or (value == "usual" and name in _USUAL) or (value == "doubted" and name in _DOUBTED):
                 continue
             if isinstance(value, str) or not (math.isfinite(value) and value >= 0.0):
                 raise InputError(f"knowns: {name} must be 0 (exact), positive, or None (free), got {value!r}")
@@ -70,8 +75,14 @@ class Knowns:
 
     @property
     def doubting(self) -> Knowns:
-        """The same with what is doubted free."""
+        """The same with a doubted blur free."""
         return replace(self, blur_sigma_mm=None) if self.blur_sigma_mm == "doubted" else self
+
+    @property
+    def doubting_core(self) -> Knowns:
+        """The same with a doubted core free as well, which only a hard edge tells from a blur."""
+        doubting = self.doubting
+        return replace(doubting, core_sigma_mm=CORE_SIGMA_MM) if self.core_sigma_mm == "doubted" else doubting
 
     def sigma(self, quantity: Quantity) -> float | None:
         """Sigma of a quantity in the unit held inside; None if it is free, 0 if it is doubted or usual."""

