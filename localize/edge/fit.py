@@ -57,8 +57,7 @@ def fit_edge(
         return _throughout(frame, start, knowns, size)
     full = sharp or clipped > EDGE.clipped
     fit: BandFit | None = None
-    # of a clipped patch the foot alone is seen, and that tells a blur from the beam's own slope no more
-    used, doubting = knowns, knowns if clipped > EDGE.clipped else knowns.doubting
+    used, doubting = knowns, knowns.doubting
     levels = _levels(EDGE.rim if full else EDGE.soft, size)
     for number, level in enumerate(levels):
         last = number + 1 == len(levels)

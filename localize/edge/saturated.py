@@ -36,6 +36,7 @@ class SaturatedFit(EdgeFit):
     rows: Array  #: displacement of each strip by the parameters and the log contrast, whitened `[S, P + 1]`
     residual: Array  #: displacements, whitened `[S]`
     contrast_spread: float  #: prior sigma of the log contrast
+    wide: float  #: by how much the seam between dark and white is wider than any sharp edge's [sigmas]
 
     @property
     def misfit(self) -> float:
@@ -43,8 +44,11 @@ class SaturatedFit(EdgeFit):
         return 1.0
 
     def suspicions(self, knowns: Knowns) -> dict[str, float]:
-        """None: which pixels are clipped does not tell."""
-        return {}
+        """A blur's alone: which pixels are clipped does not tell of beam and wall.
+
+        Light that a lens spreads brings pixels to white that the beam does not reach, by more than their size.
+        """
+        return {"edge": max(self.wide, 0.0)}
 
     def scatter(self) -> Array:
         """Covariance of the gradient `[P, P]` as the strips' residuals show it."""
@@ -76,7 +80,11 @@ def fit_saturated(
     problem = outline_problem(ribbon.pixels, ribbon.spots, float(side), nominal, used)
     normal = _normals(ribbon, estimate)
     told = [_share(c, ribbon, normal) for c in ribbon.shown]
-    share, uncertain = np.array([t[0] for t in told]), float(np.mean([t[1] for t in told]))
+    share, uncertain, wide = (
+        np.array([t[0] for t in told]),
+        float(np.mean([t[1] for t in told])),
+        max(t[2] for t in told),
+    )
     beyond = np.mean([_reach_beyond(normal, s) for s in share], axis=0) / side
     rise = np.mean([_reach_beyond(normal, s / 1.5) - _reach_beyond(normal, s * 1.5) for s in share], axis=0)
     rise = rise / (2.0 * math.log(1.5) * side)
@@ -104,7 +112,9 @@ def fit_saturated(
         step = limited(found, EDGE.saturated_step_mm)
         contrast += float(np.clip((slope[size] - whole[size, :size] @ step) / whole[size, size], -1.0, 1.0))
         estimate = estimate.moved(step, knowns.free)
-    return SaturatedFit(estimate, information, pj, step, ribbon.covered, knowns, strips, rows, residual, uncertain)
+    return SaturatedFit(
+        estimate, information, pj, step, ribbon.covered, knowns, strips, rows, residual, uncertain, wide
+    )
 
 
 def _contrast_prior(size: int, sigma: float) -> Array:
@@ -114,11 +124,11 @@ def _contrast_prior(size: int, sigma: float) -> Array:
     return prior
 
 
-def _share(shown: Shown, ribbon: Ribbon, normal: Array) -> tuple[float, float]:
-    """Which share of a pixel the beam covers when the pixel clips, and the spread of its logarithm.
+def _share(shown: Shown, ribbon: Ribbon, normal: Array) -> tuple[float, float, float]:
+    """Which share of a pixel the beam covers when the pixel clips, the spread of its logarithm, and what tells of blur.
 
     The edge leaves pixels between dark and white in a seam as wide as it moves from covering a tenth of that share to
-    covering it: their number tells.
+    covering it: their number tells. The last is by how many sigmas they are more than a sharp edge can leave.
     """
     outside = shown.usable & (ribbon.strips.offset > EDGE.seam)
     dark = float(np.median(shown.signal[outside])) if outside.any() else 0.0
@@ -128,7 +138,9 @@ def _share(shown: Shown, ribbon: Ribbon, normal: Array) -> tuple[float, float]:
     some = normal[:, :: max(1, normal.shape[1] // 200)]
     widths = np.array([np.mean(_reach_beyond(some, 0.1 * s) - _reach_beyond(some, s)) for s in shares])
     width = (number + 0.5) / (ribbon.strips.count * WIDTH)
-    return float(np.interp(width, widths, shares)), 1.0 / math.sqrt(number + 1.0)
+    most = float(widths.max()) * ribbon.strips.count * WIDTH
+    share, excess = float(np.interp(width, widths, shares)), (number - most) / math.sqrt(most + 1.0)
+    return share, 1.0 / math.sqrt(number + 1.0), excess
 
 
 def _normals(ribbon: Ribbon, estimate: Estimate) -> Array:
