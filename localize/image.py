@@ -77,6 +77,8 @@ class Frame:
 
     pixels: AnyImage
     sensor: ImageSensor
+    #: standard deviations of a compression's rounding by which white counts as white that was darkened
+    ringing: float = 0.0
 
     @property
     def steps(self) -> int | None:
@@ -90,7 +92,8 @@ class Frame:
 
     def light(self, rows: slice, columns: slice) -> tuple[Signal, NDArray[np.bool_]]:
         """Signals [white] of some pixels, and which of them are clipped and only bounds: `[h, w, C]` each."""
-        signal, clipped = linear_light(np.ascontiguousarray(self.pixels[rows, columns]), self.sensor)
+        seen = np.ascontiguousarray(self.pixels[rows, columns])
+        signal, clipped = linear_light(seen, self.sensor, self.ringing)
         return signal.reshape(*signal.shape[:2], -1), clipped.reshape(*clipped.shape[:2], -1)
 
 
@@ -128,27 +131,34 @@ def white_level(image: AnyImage, sensor: ImageSensor) -> int:
     return sensor.full_scale if image.dtype == np.uint16 else min(255, sensor.full_scale)
 
 
-def linear_light(pixels: AnyImage, sensor: ImageSensor) -> tuple[Signal, NDArray[np.bool_]]:
+def linear_light(pixels: AnyImage, sensor: ImageSensor, ringing: float = 0.0) -> tuple[Signal, NDArray[np.bool_]]:
     """Signals [white] of pixel values of any shape, and which of them are clipped and only bounds.
+
+    With `ringing` those are too that so many standard deviations of a compression's rounding may have darkened.
 
     uint8: 255 is white, or what fewer bits end at; uint16: the sensor's full scale; float: 1.0. Raises InputError for
     any other type.
     """
     if pixels.dtype == np.uint8 or pixels.dtype == np.uint16:
         full = white_level(pixels, sensor)
-        signal, clipped = _tables(sensor, full, 256 if pixels.dtype == np.uint8 else 65536)
+        signal, clipped = _tables(sensor, full, 256 if pixels.dtype == np.uint8 else 65536, ringing)
         return signal[pixels], clipped[pixels]
     if np.issubdtype(pixels.dtype, np.floating):
         share = pixels.astype(np.float32)
-        return sensor.decode(share.astype(float)).astype(np.float32), share >= sensor.clips_from
+        return sensor.decode(share.astype(float)).astype(np.float32), share >= _clips_from(sensor, ringing)
     raise InputError(f"an image must be uint8, uint16 or float, not {pixels.dtype}")
 
 
 @lru_cache(maxsize=8)
-def _tables(sensor: ImageSensor, full: int, size: int) -> tuple[Signal, NDArray[np.bool_]]:
+def _tables(sensor: ImageSensor, full: int, size: int, ringing: float) -> tuple[Signal, NDArray[np.bool_]]:
     """Signal, and whether it is clipped, of every pixel value `[size]`."""
     share = np.minimum(np.arange(size) / full, 1.0)
-    return sensor.decode(share).astype(np.float32), share >= sensor.clips_from
+    return sensor.decode(share).astype(np.float32), share >= _clips_from(sensor, ringing)
+
+
+def _clips_from(sensor: ImageSensor, ringing: float) -> float:
+    """The share from which on values count as clipped."""
+    return sensor.clips_from - ringing * sensor.noise.compression / sensor.full_scale
 
 
 def grey8(image: AnyImage, scene: Scene) -> NDArray[np.uint8]:

@@ -203,10 +203,8 @@ SENSORS: dict[str, SingleFrame] = {
     "linear": Linear(),
     **EMVA_PRESETS,
 }
-#: standard deviations of its rounding by which compression may move a clipped value down beside an edge; levels at
-#: least, and shares of all codes at most. With two levels alone, two fifths of a clipped patch's rim passed for seen at
-#: quality 75, a fourth at 90, and tips were up to 80 um off
-_RINGING, _LEAST_RINGING, _MOST_RINGING = 3.0, 2.0, 0.5
+#: levels that compression may move a clipped value down
+_RINGING = 2.0
 
 
 class Recorded(Model):
@@ -249,9 +247,8 @@ class Recorded(Model):
 
     @property
     def clips_from(self) -> float:
-        """Share from which on a pixel is only a lower bound of its light: compression may have darkened it."""
-        ringing = min(max(_RINGING * jpeg.rounding_error(self.quality), _LEAST_RINGING), _MOST_RINGING * self.codes)
-        return (float(self.code(np.array(self.camera.clips_from))) - ringing) / self.full_scale
+        """Share from which on a pixel is only a lower bound of its light: compression may have darkened it a little."""
+        return (float(self.code(np.array(self.camera.clips_from))) - _RINGING) / self.full_scale
 
     @property
     def noise(self) -> SensorNoise:

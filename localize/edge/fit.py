@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from conespot.localize.edge.band import BandFit, Stage, fit_band
@@ -54,10 +56,12 @@ def fit_edge(
     size = float(np.max(np.ptp(points, axis=0))) / (1.0 if len(start.scene.spotlights) == 1 else 2.0)
     sharp, clipped = is_sharp(start.scene), _clipped_share(frame, start)
     if sharp and clipped > EDGE.throughout:
-        return _throughout(frame, start, knowns, size)
+        return _throughout(replace(frame, ringing=EDGE.ringing), start, knowns, size)
     full = sharp or clipped > EDGE.clipped
     fit: BandFit | None = None
-    used, doubting = knowns, knowns.doubting
+    # what a compression leaves of an edge's foot looks like a spread
+    compressed = frame.sensor.noise.compression > 0.0
+    used, doubting = knowns, knowns if compressed and clipped > EDGE.clipped else knowns.doubting
     levels = _levels(EDGE.rim if full else EDGE.soft, size)
     for number, level in enumerate(levels):
         last = number + 1 == len(levels)
@@ -73,7 +77,7 @@ def fit_edge(
             if not found.contradicted:
                 break
             # one width tells that something spreads the image, two what it is
-            used = doubting = doubting.doubting_core if sharp else doubting
+            used = doubting = doubting.doubting_core if sharp and not compressed else doubting
     assert fit is not None
     return fit
 

@@ -87,6 +87,10 @@ class EdgeSettings:
     #: bins on either side of the outline that are counted, iteration by iteration: many to find it, few to measure it.
     #: Halves cost 13 %, doubles gain 7 %
     reach: tuple[float, ...] = (2.0, 2.0, 1.0, 0.5, 0.4, 0.3, 0.3)
+    #: standard deviations of a compression's rounding by which it may darken white beside an edge: with two levels in
+    #: their place a fourth of a rim passed for seen at quality 90, and tips were up to 80 um off
+    #: (`tests/unit/localize/test_doubt.py`); two of them leave 20 um, three 11
+    ringing: float = 3.0
     #: bins on either side that are looked at. Not critical
     saturated_band: float = 5.0
     #: bins on either side within which lie those between dark and white. Half of it costs 17 %
