@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Container, Iterator, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -57,16 +57,19 @@ class Bench:
         ]
         return Record(unit=unit.key, by=self._by, findings=tuple(findings))
 
-    def given(self, unit: Unit) -> Iterator[tuple[Case, AnyImage, Reference | None]]:
+    def given(
+        self, unit: Unit, only: Container[str] | None = None
+    ) -> Iterator[tuple[Case, AnyImage, Reference | None]]:
         """Of every case of a unit, what its localizers are given: the image, gone when the next case comes, and unlit.
 
-        The pose is rendered once, and exposed at every power.
+        The pose is rendered once, and exposed at every power; with `only`, at those of the cases of these keys.
         """
         group = self._plan.groups[unit.group]
         pose = group.pose(unit.pose)
         exposure, background = self._exposure(group, pose)
         tiles = self._tiles(self._scene(group)[0], unit)
-        for _, alike in itertools.groupby(group.cases, key=lambda case: case.frame):
+        wanted = [case for case in group.cases if only is None or case.key in only]
+        for _, alike in itertools.groupby(wanted, key=lambda case: case.frame):
             cases = list(alike)
             power = cases[0].scene.power.value
             with exposure.shown(tiles, power, frame_seed(unit, cases[0])) as image:
@@ -82,7 +85,7 @@ class Bench:
         """One case's frame of a unit, and what each of its localizers answers: what `measure` makes its findings of."""
         image, exposure, tiles = self._shown(unit, case)
         unlit = self._unlit(unit, case, exposure, tiles)
-        return image, {name: self._located(unit, case, image, name, unlit) for name in case.localizers}
+        return image, {name: self.located(unit, case, image, name, unlit) for name in case.localizers}
 
     def frame(self, unit: Unit, case: Case) -> AnyImage:
         """One case's frame of a unit."""
@@ -110,13 +113,13 @@ class Bench:
         bound = self._bound(case, self._plan.groups[unit.group].pose(unit.pose))
         found = []
         for localizer in case.localizers:
-            outcome = self._located(unit, case, image, localizer, unlit)
+            outcome = self.located(unit, case, image, localizer, unlit)
             found.append(
                 finding(case, localizer, outcome, bound if find_localizer(localizer).takes_knowledge else None)
             )
         return found
 
-    def _located(self, unit: Unit, case: Case, image: AnyImage, localizer: str, unlit: Reference | None) -> Outcome:
+    def located(self, unit: Unit, case: Case, image: AnyImage, localizer: str, unlit: Reference | None) -> Outcome:
         """What a localizer answers with what the case lets it know."""
         entry = find_localizer(localizer)
         oracle = self._plan.groups[unit.group].pose(unit.pose) if entry.needs_truth else None

@@ -8,7 +8,6 @@ from __future__ import annotations
 import functools
 import sys
 import tempfile
-from collections.abc import Iterable
 from pathlib import Path
 
 import pandas as pd
@@ -120,13 +119,11 @@ class Cropper:
         from conespot.results.crops import crop_of
 
         crops, findings = [], []
-        for case in self._plan.groups[unit.group].cases:
-            localizers: Iterable[str] = self._wanted.get((case.key, unit.pose), ())
-            if localizers:
-                image, outcomes = self._bench.look(unit, case)
-                for name in localizers:
-                    overlay = overlay_of(self._plan, unit, case, image, name, outcomes[name])
-                    crops.append(crop_of(case.key, name, unit.pose, overlay))
-                    findings.append(finding(case, name, outcomes[name], None))
+        for case, image, unlit in self._bench.given(unit, {case for case, pose in self._wanted if pose == unit.pose}):
+            for name in self._wanted[case.key, unit.pose]:
+                outcome = self._bench.located(unit, case, image, name, unlit)
+                overlay = overlay_of(self._plan, unit, case, image, name, outcome, residuals=False)
+                crops.append(crop_of(case.key, name, unit.pose, overlay))
+                findings.append(finding(case, name, outcome, None))
         (self._folder / f"{unit.key}.json").write_bytes(_Crops.dump_json(tuple(crops)))
         return Record(unit=unit.key, findings=tuple(findings))

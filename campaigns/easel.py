@@ -49,8 +49,13 @@ class Easel:
         )
 
 
-def overlay_of(plan: Plan, unit: Unit, case: Case, image: AnyImage, localizer: str, outcome: Outcome) -> Overlay:
-    """What is drawn over a case's frame `[H, W]` or `[H, W, 3]`: what a localizer saw in it, and the truth."""
+def overlay_of(
+    plan: Plan, unit: Unit, case: Case, image: AnyImage, localizer: str, outcome: Outcome, *, residuals: bool = True
+) -> Overlay:
+    """What is drawn over a case's frame `[H, W]` or `[H, W, 3]`: what a localizer saw in it, and the truth.
+
+    `residuals` take many times as long as all else.
+    """
     scene, pose = case.scene, plan.groups[unit.group].pose(unit.pose)
     saw = account(image, told(unit, case), localizer, outcome)
     true = [scene.camera.project(scene.outline(pose, k)) for k in range(len(scene.spotlights))]
@@ -59,6 +64,6 @@ def overlay_of(plan: Plan, unit: Unit, case: Case, image: AnyImage, localizer: s
         "found": saw.found,
         "fitted": saw.fitted,
     }
-    residuals = [Residual(p.row, p.column, p.side, p.light - p.predicted) for p in saw.patches]
+    left = [Residual(p.row, p.column, p.side, p.light - p.predicted) for p in saw.patches] if residuals else []
     white = 1.0 if image.dtype.kind == "f" else float(white_level(image, scene.sensor))
-    return Overlay(image, white, lines, saw.mask, residuals)
+    return Overlay(image, white, lines, saw.mask, left)

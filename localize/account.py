@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -47,36 +48,43 @@ class Account:
 
     `mask` `[H, W]` is what it took for light and `found` the outlines `[N, 2]` it cut out, of those that threshold.
     `fitted` are the outlines `[N, 2]` of what it fitted: ellipses (drawn as the cones over them, which is the same to a
-    micrometre, paper, Table I) or the cones of its answer. `patches` are predicted from the answer, none without one;
-    `edges` are where their light itself falls to the level that the answer predicts at its outline `[N, 2]`.
+    micrometre, paper, Table I) or the cones of its answer. What takes longer than localizing is worked out when it is
+    asked for: from the `answer` and the `frame`, none without an answer.
     """
 
+    frame: Frame
+    answer: Estimate | None = None
     mask: NDArray[np.bool_] | None = None
     found: tuple[Array, ...] = ()
     fitted: tuple[Array, ...] = ()
-    patches: tuple[Patch, ...] = ()
-    edges: tuple[Array, ...] = ()
+
+    @cached_property
+    def patches(self) -> tuple[Patch, ...]:
+        """What the answer predicts."""
+        return () if self.answer is None else _patches(self.frame, self.answer)
+
+    @cached_property
+    def edges(self) -> tuple[Array, ...]:
+        """Where the patches' light itself falls to the level that the answer predicts at its outline `[N, 2]`."""
+        return tuple(_edge(patch) for patch in self.patches)
 
 
 def account(image: AnyImage, scene: Scene, localizer: str, outcome: Outcome) -> Account:
     """What a localizer of that name saw in a checked image on the way to its `outcome`."""
-    fitted: tuple[Array, ...] = ()
-    patches: tuple[Patch, ...] = ()
+    frame, estimate = Frame(image, scene.sensor), None
     if not isinstance(outcome, LocalizationFailure):
         estimate = Estimate(Pose(outcome.apex_mm, outcome.axis, outcome.roll or 0.0), scene)
-        fitted = tuple(outline(estimate, k, _POINTS) for k in range(len(scene.spotlights)))
-        patches = _patches(Frame(image, scene.sensor), estimate)
-    edges = tuple(_edge(patch) for patch in patches)
     method = METHODS.get(localizer)
     if method is None:
-        return Account(fitted=fitted, patches=patches, edges=edges)
+        cones = () if estimate is None else tuple(outline(estimate, k, _POINTS) for k in range(len(scene.spotlights)))
+        return Account(frame, estimate, fitted=cones)
     steps = method.steps(image, scene)
     mask = np.zeros(scene.camera.shape, bool)
     height, width = steps.mask.bright.shape
     mask[steps.mask.top : steps.mask.top + height, steps.mask.left : steps.mask.left + width] = steps.mask.bright
     fitted = tuple(_drawn(pair.apexes[0], pair.axes[0], scene) for pair in steps.pairs)
     found = tuple(np.asarray(points + 0.5, np.float64) for points in steps.outlines)
-    return Account(mask, found, fitted, patches, edges)
+    return Account(frame, estimate, mask, found, fitted)
 
 
 def _drawn(apex: Array, axis: Array, scene: Scene) -> Array:
