@@ -119,8 +119,12 @@ def _add_runs(add: _Add) -> None:
     which.add_argument("--reason", metavar="TEXT", type=_text, help=reason)
     add_machines(retry)
     retry.add_argument("--log", metavar="FILE", type=Path, help="as for run")
-    report = add(subcommands.report, "make the tables, figures and report of a run folder again")
-    report.add_argument("folder", type=Path, metavar="RUN")
+    report = add(subcommands.report, "make the tables, figures and report of a run folder again; of several, one page")
+    words = "a run folder; several are laid side by side on one page, the first as the reference"
+    report.add_argument("folders", type=Path, nargs="+", metavar="RUN", help=words)
+    report.add_argument(
+        "--out", type=Path, metavar="FILE", help="of several: the page (side_by_side.html of the first)"
+    )
     report.add_argument("--crops", metavar="N", type=few, default=0, help="render N worst frames of each box again")
     add_workers(report)
 

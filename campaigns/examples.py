@@ -17,7 +17,7 @@ EXAMPLES: dict[str, tuple[str, ...]] = {
     "run": ("campaign run mine.yaml --set frames=true", "campaign run mine.yaml --shard 1/2"),
     "status": ("campaign status runs/mine",),
     "retry": ("campaign retry runs/mine --failed",),
-    "report": ("campaign report runs/mine",),
+    "report": ("campaign report runs/mine", "campaign report runs/mine runs/mine-1-of-2"),
     "compare": ("campaign compare runs/mine --lights white,led-b3",),
     "export": ("campaign export runs/mine --frames exported",),
     "score": (

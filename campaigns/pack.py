@@ -12,6 +12,7 @@ from conespot.campaigns import archive, crate
 from conespot.campaigns.journal import FILE as JOURNAL
 from conespot.campaigns.lock import alone
 from conespot.campaigns.plan import make_plan
+from conespot.campaigns.rows_stamp import FILE as STAMP
 from conespot.campaigns.schema import read_campaign
 from conespot.campaigns.software import software
 from conespot.campaigns.standing import FILE as STANDING
@@ -44,7 +45,7 @@ def pack(folder: Path, out: Path | None) -> str:
             damage, kept = store.damage, len(store.entries)
         if damage:
             raise InputError(f"{damage[0]}; run the campaign again before it is packed")
-        left_out = {STANDING} | ({target.name} if target.resolve().parent == folder.resolve() else set())
+        left_out = {STANDING, STAMP} | ({target.name} if target.resolve().parent == folder.resolve() else set())
         files: dict[str, bytes | Path] = {
             name: path for name, path in archive.plain_files(folder) if name not in left_out
         }

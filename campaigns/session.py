@@ -8,6 +8,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
+from conespot.campaigns import rows_stamp
 from conespot.campaigns.ending import RunError
 from conespot.campaigns.executor import Executor
 from conespot.campaigns.interruption import interruption
@@ -146,8 +147,27 @@ def report(folder: Path, crops: int = 0, workers: int = 1) -> None:
         write_results(folder)
 
 
+def report_beside(folders: Sequence[Path], out: Path | None = None) -> tuple[Path, list[str]]:
+    """Lay runs side by side on one page, by default in the first one's folder; the file and what it says.
+
+    Raises InputError for a folder that is no run or holds no rows, and where no setting is in both.
+    """
+    from conespot.results.report.beside import FILE, lay_beside
+    from conespot.results.run import load_run
+
+    for folder in folders:
+        if not folder.is_dir():
+            raise InputError(f"{folder}: no such run folder; `campaign run NAME --out {folder}` makes one")
+        with alone(folder):
+            renew_rows(folder)
+    page, sentences = lay_beside([load_run(folder) for folder in folders])
+    path = out or folders[0] / FILE
+    write_atomically(path, page)
+    return path, sentences
+
+
 def renew_rows(folder: Path) -> None:
-    """Write the rows of a run folder again from its journal.
+    """Write the rows of a run folder again from its journal, unless they follow from it already.
 
     Rows are left as they are where this installation cannot tell what the journal means: a run of another schema, one
     whose localizers are not installed, a stranger's without a journal. Raises InputError if there are none either.
@@ -155,7 +175,7 @@ def renew_rows(folder: Path) -> None:
     from conespot.results.rows import find_rows
 
     begun = (folder / "journal.jsonl").exists() and (folder / "campaign.yaml").exists()
-    if not begun or not goes_on(read_begun_with(folder)):
+    if not begun or rows_stamp.follows(folder) or not goes_on(read_begun_with(folder)):
         return
     try:
         document = read_campaign(str(folder / "campaign.yaml"))

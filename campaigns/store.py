@@ -15,6 +15,7 @@ from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from conespot.campaigns import rows_stamp
 from conespot.campaigns.cases import write_cases
 from conespot.campaigns.ending import RunError
 from conespot.campaigns.journal import FILE, Entry, Journal
@@ -123,6 +124,7 @@ class Store:
         if not self.entries:
             return 0
         frame = self.rows()
+        rows_stamp.forget(self.folder)
         begun = in_a_line(self.begun_with)
         makers = Counter(entry.by or begun for entry in self.entries.values() if not entry.error)
         write_atomically(self.folder / MAKERS, json.dumps(dict(sorted(makers.items())), ensure_ascii=False).encode())
@@ -130,6 +132,8 @@ class Store:
         packed = io.BytesIO()
         frame.to_parquet(packed, index=False)
         write_atomically(self.folder / "errors.parquet", packed.getbuffer())
+        if not self._journal.damage:  # which is told whenever rows are made of it
+            rows_stamp.stamp(self.folder, max(entry.offset + entry.length for entry in self.entries.values()))
         return len(frame)
 
 

@@ -83,11 +83,21 @@ def theory(options: argparse.Namespace) -> Ending:
 
 
 def report(options: argparse.Namespace) -> Ending:
-    """Make what a run folder holds again from its journal."""
-    from conespot.campaigns.session import report
+    """Make what a run folder holds again from its journal, or lay several runs side by side."""
+    from conespot.campaigns.session import report, report_beside
+    from conespot.scene.document import InputError
 
-    report(options.folder, options.crops, options.workers)
-    say_results(options.folder)
+    if len(options.folders) > 1:
+        if options.crops:
+            raise InputError("--crops goes with one run folder; make the crops of each by itself")
+        path, sentences = report_beside(options.folders, options.out)
+        _mention("\n".join([*sentences, f"{path}: both runs on one page"]))
+        return Ending.DONE
+    if options.out:
+        raise InputError("--out goes with several run folders; the report of one stands in it, as report.html")
+    (folder,) = options.folders
+    report(folder, options.crops, options.workers)
+    say_results(folder)
     return Ending.DONE
 
 

@@ -30,12 +30,15 @@ def released_table(run: Run) -> Table | None:
         return None
     records: list[dict[str, Any]] = []
     lines: list[tuple[str, ...]] = []
-    for variant, part in split(run.rows.frame, run.rows.group):
-        for axes, here in by_axes(part):
+    frame = run.rows.frame
+    if not (frame["trajectory"] == "spiral").any():
+        return None
+    for variant, part in split(frame, run.rows.group):
+        alike = (part["trajectory"] == "spiral") & (part["spotlights"] == "single") & (part["surface"] == "smooth")
+        for axes, here in by_axes(part[alike]):
             good = here[here["status"] == "ok"]
             scene = _geometry(run, here)
-            where = (axes["trajectory"], axes["spotlights"], axes["surface"])
-            if scene is None or where != ("spiral", "single", "smooth") or len(good) < 3 or not _theirs(here):
+            if scene is None or len(good) < 3 or not _theirs(here):
                 continue
             ours = statistics(good, *scene)
             counts = {"n": len(good), "failed": len(here) - len(good)}

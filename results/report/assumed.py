@@ -38,7 +38,7 @@ def assumed(run: Run) -> Assumed | None:
     if run.rows is None:
         return None
     sets: dict[Assumptions, list[str]] = {}
-    for variant, part in split(run.rows.frame, run.rows.group):
+    for variant, part in split(run.rows.frame[[*run.rows.group, "case"]], run.rows.group):
         surfaces = ordered(part["surface"])
         for surface in surfaces:
             label = f"{variant.label}, {surface}" if len(surfaces) > 1 else variant.label

@@ -158,7 +158,7 @@ def _failures(run: Run) -> Block | None:
     if run.rows is None:
         return None
     lines: list[tuple[str, ...]] = []
-    for variant, part in split(run.rows.frame, run.rows.group):
+    for variant, part in split(run.rows.frame[[*run.rows.group, "status", "reason"]], run.rows.group):
         counted: dict[tuple[str, ...], int] = {}
         frames: dict[tuple[str, ...], int] = {}
         for axes, here in by_axes(part[[*AXES, "status", "reason"]]):

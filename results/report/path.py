@@ -14,7 +14,7 @@ from conespot.results.pose_figure import at_reference_power
 from conespot.results.report.chart import Json, numbers, plain, tone
 from conespot.results.report.frames import frame_of
 from conespot.results.run import Run
-from conespot.results.variants import AXES, by_axes, split
+from conespot.results.variants import by_axes, split
 
 _MOST_PATHS, _MOST_POSES, _MOST_NEEDLES = 12, 300, 40
 #: how much of a needle is drawn [mm]: errors of some tens of micrometres would not show on its whole length
@@ -28,11 +28,9 @@ def paths(run: Run) -> list[Path]:
     found: list[Path] = []
     if run.rows is None:
         return found
-    for variant, part in split(run.rows.frame, run.rows.group):
-        rows = at_reference_power(part)
-        for axes, here in by_axes(
-            rows[[*AXES, "case", "localizer", "pose", "status", *TRUE_TIP, *TIP, "position_error_mm"]]
-        ):
+    needed = [*run.rows.group, "case", "pose", "status", *TRUE_TIP, *TIP, "position_error_mm"]
+    for variant, part in split(run.rows.frame[needed], run.rows.group):
+        for axes, here in by_axes(at_reference_power(part)):
             if len(found) == _MOST_PATHS:
                 return found
             name = f"{axes['trajectory']}, {axes['surface']}, {axes['spotlights']}, {variant.label}"

@@ -48,7 +48,8 @@ def _localized(frame: pd.DataFrame) -> str:
 def _accurate(run: Run) -> str:
     assert run.rows is not None
     medians: list[tuple[float, float, float, str, pd.DataFrame]] = []
-    for variant, part in split(run.rows.frame, run.rows.group):
+    told = run.rows.frame[[*run.rows.group, "case", "status", _ERROR]]
+    for variant, part in split(told, run.rows.group):
         rows = at_reference_power(part)
         good = rows.loc[rows["status"] == "ok", _ERROR]
         if len(good):

@@ -42,7 +42,7 @@ def _lines(run: Run, places: pd.Series, x: str, said: Callable[[str], str]) -> t
     layout["xaxis"] |= {"type": "log"}
     layout["yaxis"] |= {"type": "log"}
     traces: list[Json] = []
-    frame = run.rows.frame.assign(place=places)
+    frame = run.rows.frame[[*run.rows.group, "status", _ERROR]].assign(place=places)
     for k, (variant, part) in enumerate(split(frame, run.rows.group)):
         for j, ((surface, trajectory, rig), here) in enumerate(
             part.groupby(["surface", "trajectory", "spotlights"], sort=True)
@@ -90,7 +90,7 @@ def coverage(run: Run) -> tuple[list[Json], Json] | None:
     if run.rows is None:
         return None
     counted: dict[str, Counter[str]] = {}
-    for variant, part in split(run.rows.frame, run.rows.group):
+    for variant, part in split(run.rows.frame[[*run.rows.group, "status", "reason"]], run.rows.group):
         for rig, here in part.groupby("spotlights", sort=True):
             if len(counted) == _MOST_BARS:
                 break

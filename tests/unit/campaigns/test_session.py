@@ -116,3 +116,20 @@ def test_rows_are_renewed_from_the_journal_where_it_can_be_understood_and_kept_w
         rows.unlink()
     with pytest.raises(InputError, match="unknown localizer 'beacon'"):
         renew_rows(folder)
+
+
+@pytest.mark.usefixtures("undrawn")
+def test_rows_that_follow_from_the_journal_are_not_made_again_and_others_are(run):
+    folder = run(AtOnce())
+    before = {path: path.read_bytes() for path in folder.glob("errors.*")}
+    touched = {path: path.stat().st_mtime_ns for path in before}
+    renew_rows(folder)
+    assert {path: path.stat().st_mtime_ns for path in before} == touched
+    for path in before:
+        path.write_bytes(before[path].replace(b"ok", b"OK"))
+        renew_rows(folder)
+        assert path.read_bytes() == before[path]
+    journal = folder / "journal.jsonl"
+    journal.write_bytes(b"".join(journal.read_bytes().splitlines(keepends=True)[:-1]))
+    renew_rows(folder)
+    assert (folder / "errors.csv").stat().st_size < len(before[folder / "errors.csv"])
