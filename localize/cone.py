@@ -27,13 +27,13 @@ def cone(
     noise: NoiseModel | None = None,
 ) -> Outcome:
     """The tip from a checked image `[H, W]` or `[H, W, 3]`; `reference` (no spotlight) helps the search only."""
-    known, frame = (knowns or Knowns()).within(scene), Frame(image, scene.sensor)
+    known, frame = knowns or Knowns(), Frame(image, scene.sensor)
     sensor = noise_of(frame, noise)
 
-    def localized(start: Start) -> Outcome:
-        return edge_outcome(frame, Estimate(start.pose, scene), known, sensor)
+    def localized(start: Start, there: Scene) -> Outcome:
+        return edge_outcome(frame, Estimate(start.pose, there), known.within(there), sensor)
 
-    return answered(frame, scene, reference, localized)
+    return answered(frame, scene, reference, known, localized)
 
 
 def edge_outcome(

@@ -2,45 +2,76 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+import itertools
+from collections.abc import Callable, Iterable
 from dataclasses import replace
 
 import numpy as np
 
 from conespot.localize.compression import compressed
+from conespot.localize.halo import glowing, glows
 from conespot.localize.image import Frame, Reference
 from conespot.localize.model.estimate import Estimate
+from conespot.localize.model.knowns import Knowns
 from conespot.localize.model.noise import NoiseModel
 from conespot.localize.model.view import outlines
-from conespot.localize.outcome import COMPRESSED, Localization, LocalizationFailure, Outcome
+from conespot.localize.outcome import COMPRESSED, GLOWS, Localization, LocalizationFailure, Outcome
 from conespot.localize.start.search import Start, believed, find_starts
 from conespot.localize.verdict import MISFIT, WRONG_BEAM, WRONG_WALL
 from conespot.scene.pose import Pose
 from conespot.scene.scene import Scene
 from conespot.scene.sensor import Recorded
 
+#: localizes from a start in a scene
+Localizes = Callable[[Start, Scene], Outcome]
 
-def answered(frame: Frame, scene: Scene, reference: Reference | None, localized: Callable[[Start], Outcome]) -> Outcome:
-    """The one answer of a frame's starts that may be believed, or what speaks against the frame."""
+
+def answered(frame: Frame, scene: Scene, reference: Reference | None, knowns: Knowns, localized: Localizes) -> Outcome:
+    """The one answer of a frame's starts that may be believed, or what speaks against the frame.
+
+    A scene may say nothing of light from under the retina. Where the frame shows some, the scene is taken to have what
+    is usual: the answer is then that scene's, or none, unless the `knowns` say that there is exactly none.
+    """
+    starts = find_starts(frame, scene, reference)
+    lit = None if knowns.deep_amount_sigma == 0.0 else glowing(scene)
+    if lit is None:
+        return _answered(frame, scene, starts, localized)[0]
+
+    def fades(pose: Pose | None) -> bool:
+        return pose is not None and glows(frame, Estimate(pose, scene), reference)
+
+    first = next(starts, None)
+    every = () if first is None else itertools.chain([first], starts)
+    if first is not None and not fades(first.pose):
+        return _answered(frame, scene, every, localized)[0]
+    found, there = _answered(frame, lit, find_starts(frame, lit, reference), localized)
+    if isinstance(found, Localization) and fades(there):
+        return found
+    plain, pose = _answered(frame, scene, every, localized)
+    # a start is not yet a patch
+    return LocalizationFailure(GLOWS) if isinstance(plain, Localization) and fades(pose) else plain
+
+
+def _answered(frame: Frame, scene: Scene, starts: Iterable[Start], localized: Localizes) -> tuple[Outcome, Pose | None]:
+    """The same for a scene as it is, and where the patch is taken to be."""
     tried: list[Start] = []
 
     def followed(start: Start) -> Outcome:
         tried.append(start)
-        return localized(start)
+        return localized(start, scene)
 
-    outcome = believed(find_starts(frame, scene, reference), scene, followed)
-    if isinstance(scene.sensor, Recorded):
-        return outcome
+    outcome = believed(starts, scene, followed)
+    pose = tried[0].pose if tried else None
     if isinstance(outcome, Localization):
         pose = Pose(outcome.apex_mm, outcome.axis, outcome.roll or 0.0)
-    elif tried and outcome.reason in (MISFIT, WRONG_BEAM, WRONG_WALL):
-        pose = tried[0].pose
-    else:
-        return outcome
+    elif outcome.reason not in (MISFIT, WRONG_BEAM, WRONG_WALL):
+        return outcome, pose
+    if pose is None or isinstance(scene.sensor, Recorded):
+        return outcome, pose
     points = outlines(Estimate(pose, scene))
     if len(points) and compressed(frame.pixels, *_around(points, scene)):
-        return LocalizationFailure(COMPRESSED)
-    return outcome
+        return LocalizationFailure(COMPRESSED), pose
+    return outcome, pose
 
 
 def noise_of(frame: Frame, told: NoiseModel | None) -> NoiseModel:

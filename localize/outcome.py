@@ -16,6 +16,10 @@ UNCERTAIN: Final = "too uncertain: the patch and what is known do not hold the t
 OUTSIDE: Final = "the tip would be outside the eye"
 #: reasons of the frame itself
 COMPRESSED: Final = "the frame went through JPEG, of which the scene's sensor says nothing: state a recorded one"
+GLOWS: Final = (
+    "the patch glows beyond its rim, as light from under the retina does, and does not fit what is usual of that: give "
+    "the scene's retina a spread"
+)
 #: reasons of the published methods
 NOTHING_FOUND: Final = "nothing found: no patch stands out of the background"
 NO_LIGHT: Final = "no light of a spotlight: nothing is twice as bright as its surroundings"

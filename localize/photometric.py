@@ -31,13 +31,13 @@ def photometric(
     noise: NoiseModel | None = None,
 ) -> Outcome:
     """The tip from a checked image `[H, W]` or `[H, W, 3]`; `reference` is the same view in ambient light alone."""
-    known, frame = (knowns or Knowns()).within(scene), Frame(image, scene.sensor)
+    known, frame = knowns or Knowns(), Frame(image, scene.sensor)
     sensor = noise_of(frame, noise)
 
-    def localized(start: Start) -> Outcome:
-        return patch_outcome(frame, Estimate(start.pose, scene), known, sensor, reference)
+    def localized(start: Start, there: Scene) -> Outcome:
+        return patch_outcome(frame, Estimate(start.pose, there), known.within(there), sensor, reference)
 
-    return answered(frame, scene, reference, localized)
+    return answered(frame, scene, reference, known, localized)
 
 
 def patch_outcome(

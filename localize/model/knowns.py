@@ -51,7 +51,8 @@ class Knowns:
     #: measured, a height map's error. No fit sees it; the distance from the wall does
     relief_sigma_mm: float = 0.0
     #: of the logarithms of how much light comes back from under the retina and of how far it goes; usual is a factor of
-    #: two where the scene's retina spreads light, and elsewhere that none does
+    #: two where the scene's retina spreads light, and elsewhere that none does until a patch glows beyond its rim. An
+    #: amount known exactly, with 0, is not doubted
     deep_amount_sigma: float | Literal["usual"] | None = "usual"
     deep_length_sigma: float | Literal["usual"] | None = "usual"
 
