@@ -166,6 +166,8 @@ class Surface(Model):
         for bump, axis in zip(self.bumps, self._axes(eye), strict=True):
             widest = math.cos(min(bump.reach / eye.radius, math.pi))
             near = np.flatnonzero(d @ axis > widest)
+            if not len(near):  # a tip's wall is near few of them, and asked for a few points at a time
+                continue
             here = d[near]
             # the chord gives the arc to full precision where the cosine would lose half the digits
             arc = 2.0 * eye.radius * np.arcsin(np.clip(np.linalg.norm(here - axis, axis=-1) / 2.0, 0.0, 1.0))
