@@ -22,6 +22,7 @@ _MEANS = {
     "boxes.csv": "box statistics",
     "crops.json": "pictures of the worst frames of each box",
     "report.html": "the report",
+    "side_by_side.html": "the run beside others",
     "inputs": "a file that the campaign names",
     "tables": "a table of the report",
     "figures": "a figure of the report",

@@ -65,13 +65,17 @@ def keep_crops(folder: Path, per_box: int | None, workers: int) -> None:
 
 
 def worst_frames(rows: Rows, per_box: int, most: int) -> tuple[Wanted, int]:
-    """At most so many frames with the largest position errors of each box, the worst of all first, and who is left out.
+    """At most so many frames: one that each localizer refused for each reason, then the worst of each box.
 
-    The second is how many answers are among the worst too, on frames beyond the `most`.
+    The commonest refusals take a quarter of the frames at most, the rest are those with the largest position errors,
+    the worst of all first. The second is how many answers are among these too, on frames beyond the `most`.
     """
+    wanted: Wanted = {}
+    for case, pose, localizer in _refused(rows.frame).head(most // 4).itertuples(index=False):
+        key = str(case), int(pose)
+        wanted[key] = (*wanted.get(key, ()), str(localizer))
     ok = rows.frame[rows.frame["status"] == "ok"].sort_values([_ERROR, "case", "pose"], ascending=[False, True, True])
     worst: pd.DataFrame = ok.groupby(list(rows.group), sort=False).head(per_box)
-    wanted: Wanted = {}
     left_out = 0
     for case, pose, localizer in worst[["case", "pose", "localizer"]].itertuples(index=False):
         key = str(case), int(pose)
@@ -80,6 +84,14 @@ def worst_frames(rows: Rows, per_box: int, most: int) -> tuple[Wanted, int]:
         else:
             left_out += 1
     return wanted, left_out
+
+
+def _refused(frame: pd.DataFrame) -> pd.DataFrame:
+    """Case, pose and localizer of the first frame of each localizer and reason, the commonest reason first."""
+    failed = frame[frame["status"] == "failed"]
+    groups = failed.groupby(["localizer", "reason"], sort=False)
+    first = failed.assign(times=groups["pose"].transform("size"))[~failed.duplicated(["localizer", "reason"])]
+    return first.sort_values("times", ascending=False, kind="stable")[["case", "pose", "localizer"]]
 
 
 def _units(plan: Plan, wanted: Wanted) -> list[Unit]:

@@ -9,7 +9,7 @@ from typing import Any
 import pandas as pd
 
 from conespot.results.boxes import box_table
-from conespot.results.columns import column
+from conespot.results.columns import SETTING, Column, column
 from conespot.results.paper_values import CITATION
 from conespot.results.power_figure import PANELS, shown_powers
 from conespot.results.report.chart import Chart, Json, axes, numbers, panels, plain, subplots, tone
@@ -103,19 +103,24 @@ def _block(one: SideBySide, a: str, b: str) -> Block:
     """The settings of both, a line each; position errors in um."""
     lines = []
     for row in one.table.head(_MOST_LINES).to_dict("records"):
-        setting = tuple(named(str(name), row[name]) for name in one.keys)
+        setting = tuple(f"{v:g}" if isinstance(v := row[name], float) else str(v) for name in one.keys)
         failed = f"{row['failed_a']} / {row['failed_b']}"
         errors = (number(1e3 * row[name]) for name in ("mean_a", "mean_b", "median_a", "median_b"))
-        change = f"{1e3 * row['difference']:+.3g}" if math.isfinite(row["difference"]) else "–"
+        difference = f"{1e3 * row['difference']:+.3g}" if math.isfinite(row["difference"]) else "–"
         z = f"{row['z']:+.3g}" if math.isfinite(row["z"]) else "–"
         paired = "paired" if row["paired"] else "apart"
         tells = "yes" if abs(row["z"]) > one.bar else "no"
         counts = f"{row['n_a']} / {row['n_b']}"
-        lines.append((*setting, counts, failed, *errors, number(row["ratio"]), change, z, paired, tells))
-    header = (*(name.removeprefix("scene.") for name in one.keys), "n", "failed", f"mean, {a} [um]", f"mean, {b} [um]",
-              "median", "median", "ratio", "difference", "z", "poses", "differs")  # fmt: skip
+        mean_a, mean_b, *medians = errors
+        change = (number(row["ratio"]), difference, z, tells)
+        lines.append((*setting, mean_a, mean_b, *change, paired, counts, failed, " / ".join(medians)))
+    columns = {name: column(name) for name in SETTING}
+    setting = tuple(_heading(name, columns.get(name)) for name in one.keys)
+    header = (*setting, f"mean, {a}", f"mean, {b}", "ratio", "difference", "z", "differs", "poses", "n", "failed",
+              "medians")  # fmt: skip
     notes = [
-        f"n and failed: {a} / {b}. Ratio and difference are those of the means, {b} over and minus {a}. 'paired': the "
+        f"Tip errors in um; n, failed and medians: {a} / {b}. Ratio and difference are those of the means, {b} "
+        f"over and minus {a}. 'paired': the "
         "same poses, z of the mean difference over those that both localized; 'apart': Welch's z. A setting differs "
         f"where |z| > {one.bar:.2f}, which one of {len(one.table)} passes by chance in 5 % (Sidak)."
     ]
@@ -124,6 +129,13 @@ def _block(one: SideBySide, a: str, b: str) -> Block:
     if len(one.table) > _MOST_LINES:
         notes.append(f"{len(one.table) - _MOST_LINES} more settings are left out.")
     return Block(f"{b} beside {a}", header, tuple(lines), tuple(notes))
+
+
+def _heading(name: str, known: Column | None) -> str:
+    """A column of the settings, with its unit."""
+    if known is None or not known.unit:
+        return name.removeprefix("scene.")
+    return f"{name.removesuffix(f'_{known.unit.lower()}')} [{known.unit}]"
 
 
 def _charts(runs: Sequence[Run], names: Sequence[str], keys: tuple[str, ...]) -> Iterator[Chart]:
@@ -148,8 +160,11 @@ def _chart(name: str, title: str, boxes: pd.DataFrame, names: Sequence[str]) -> 
     layout = panels(titles, "light power [W]", units)
     traces: list[Json] = []
     for row, (_, metric) in enumerate(PANELS):
+        most = boxes.loc[(boxes["metric"] == metric) & boxes["spotlights"].isin(rigs), "whisker_high"].max()
         for k, rig in enumerate(rigs):
             at = row * len(rigs) + k
+            if math.isfinite(most):  # the plotting library sees no extent of boxes that come as quartiles
+                layout[f"yaxis{at + 1 if at else ''}"] |= {"range": [0.0, 1.06 * most]}
             here = boxes[(boxes["metric"] == metric) & (boxes["spotlights"] == rig) & (boxes["n"] > 0)]
             for i, told in enumerate(names):
                 mine = here[(here["run"] == i) & here["power_w"].isin(powers)]
@@ -160,8 +175,6 @@ def _chart(name: str, title: str, boxes: pd.DataFrame, names: Sequence[str]) -> 
     for key in [key for key in layout if key.startswith("xaxis")]:
         ticks = {"tickvals": list(range(len(powers))), "ticktext": [f"{power:g}" for power in powers]}
         layout[key] |= {**ticks, "range": [-0.6, len(powers) - 0.4], "showgrid": False}
-    for key in [key for key in layout if key.startswith("yaxis")]:
-        layout[key] |= {"rangemode": "tozero"}
     words = f"Boxes of position and rotation errors over light power, {' and '.join(names)} beside each other."
     caption = "Boxes show the quartiles, whiskers end within 1.5 interquartile ranges (Tukey); dashed lines are means."
     return Chart(name, title, caption, words, traces, layout, grid=subplots(len(PANELS), len(rigs)))
