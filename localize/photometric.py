@@ -15,7 +15,6 @@ from conespot.localize.image import AnyImage, Frame, Reference
 from conespot.localize.model.estimate import Estimate
 from conespot.localize.model.knowns import Knowns
 from conespot.localize.model.noise import NoiseModel
-from conespot.localize.model.solve import inverse
 from conespot.localize.outcome import LocalizationFailure, Outcome
 from conespot.localize.start.search import Start
 from conespot.localize.verdict import judged
@@ -50,6 +49,6 @@ def patch_outcome(
     if isinstance(fit, LocalizationFailure):
         return fit
     return judged(
-        fit.estimate, inverse(fit.information), start.scene, fit.knowns,
+        fit.estimate, fit.covariance, start.scene, fit.knowns,
         misfit=fit.misfit, covered=fit.lit_share, settled=fit.settled,
     )  # fmt: skip

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from conespot.localize.edge.band import BandFit, Stage, fit_band
 from conespot.localize.edge.sandwich import EdgeFit
@@ -18,6 +19,8 @@ from conespot.localize.model.profile import Profile
 from conespot.localize.model.view import edge_width, outlines
 from conespot.localize.outcome import COVERED, UNCERTAIN, LocalizationFailure
 from conespot.scene.scene import Scene
+
+Array = NDArray[np.float64]
 
 
 def is_sharp(scene: Scene) -> bool:
@@ -42,6 +45,26 @@ def _clipped_share(frame: Frame, start: Estimate) -> float:
     return float(np.mean(clipped)) if clipped.size else 0.0
 
 
+@dataclass(frozen=True)
+class _Patch:
+    """What decides how a patch is fitted."""
+
+    size: float  #: [px]
+    sharp: bool  #: whether its edge is a step
+    clipped: float  #: share of its middle
+
+    @classmethod
+    def of(cls, frame: Frame, start: Estimate, points: Array) -> _Patch:
+        """From its outlines' points `[N, 2]` [px]."""
+        size = float(np.max(np.ptp(points, axis=0))) / (1.0 if len(start.scene.spotlights) == 1 else 2.0)
+        return cls(size, is_sharp(start.scene), _clipped_share(frame, start))
+
+    @property
+    def levels(self) -> list[Level]:
+        """The levels that bring a start to its edge."""
+        return _levels(EDGE.rim if self.sharp or self.clipped > EDGE.clipped else EDGE.soft, self.size)
+
+
 def fit_edge(
     frame: Frame,
     start: Estimate,
@@ -53,22 +76,40 @@ def fit_edge(
     points = outlines(start)
     if len(points) < EDGE.fewest_points:
         return LocalizationFailure(COVERED)
-    size = float(np.max(np.ptp(points, axis=0))) / (1.0 if len(start.scene.spotlights) == 1 else 2.0)
-    sharp, clipped = is_sharp(start.scene), _clipped_share(frame, start)
-    if sharp and clipped > EDGE.throughout:
-        return _throughout(replace(frame, ringing=EDGE.ringing), start, knowns, size)
-    full = sharp or clipped > EDGE.clipped
+    patch = _Patch.of(frame, start, points)
+    if not (patch.sharp and patch.clipped > EDGE.throughout):
+        return _bands(frame, start, knowns, noise, reference, patch)
+    found: list[EdgeFit | LocalizationFailure] = [
+        _throughout(replace(frame, ringing=EDGE.ringing), start, knowns, patch.size)
+    ]
+    # what a compression leaves of so high an edge is nothing to measure
+    if not frame.sensor.noise.compression > 0.0:
+        found.append(_bands(frame, start, knowns, noise, reference, patch))
+    # the brighter the light, the fewer pixels of the edge are neither dark nor clipped: then bands hold the tip less
+    held = [fit for fit in found if isinstance(fit, EdgeFit) and fit.settled]
+    return min(held, key=lambda fit: float(np.trace(fit.covariance[:3, :3])), default=found[0])
+
+
+def _bands(
+    frame: Frame,
+    start: Estimate,
+    knowns: Knowns,
+    noise: NoiseModel,
+    reference: Reference | None,
+    patch: _Patch,
+) -> BandFit | LocalizationFailure:
+    """The fit of bands, coarse to fine."""
     fit: BandFit | None = None
     # what a compression leaves of an edge's foot looks like a spread
     compressed = frame.sensor.noise.compression > 0.0
-    used, doubting = knowns, knowns if compressed and clipped > EDGE.clipped else knowns.doubting
-    levels = _levels(EDGE.rim if full else EDGE.soft, size)
-    for number, level in enumerate(levels):
-        last = number + 1 == len(levels)
+    used, doubting = knowns, knowns if compressed and patch.clipped > EDGE.clipped else knowns.doubting
+    for number, level in enumerate(patch.levels):
+        last = number + 1 == len(patch.levels)
         while True:
             found = fit_band(
-                frame, start, fit, used, noise, reference, stage=_stage(level, size, edge_width(start), last=last),
-                tied=number == 0 and len(levels) > 1, doubted=doubting if used != doubting else None,
+                frame, start, fit, used, noise, reference,
+                stage=_stage(level, patch.size, edge_width(start), last=last),
+                tied=number == 0 and len(patch.levels) > 1, doubted=doubting if used != doubting else None,
             )  # fmt: skip
             if isinstance(found, LocalizationFailure):
                 # what starts inside the frame and leaves it has run off
@@ -77,7 +118,7 @@ def fit_edge(
             if not found.contradicted:
                 break
             # one width tells that something spreads the image, two what it is
-            used = doubting = doubting.doubting_core if sharp and not compressed else doubting
+            used = doubting = doubting.doubting_core if patch.sharp and not compressed else doubting
     assert fit is not None
     return fit
 
@@ -104,7 +145,8 @@ def _stage(level: Level, size: float, width: float, *, last: bool) -> Stage:
 def _throughout(frame: Frame, start: Estimate, knowns: Knowns, size: float) -> SaturatedFit | LocalizationFailure:
     """The fit of a patch that is clipped throughout, coarse to fine."""
     fit: SaturatedFit | None = None
-    sides = [side for side in (int(size / bins) for bins in EDGE.saturated_bins) if side > 1]
+    # a small patch has no coarser bins than pixels: the axis is on the RCM in the first fit, and never in the last
+    sides = [side for side in (int(size / bins) for bins in EDGE.saturated_bins) if side > 1] or [1]
     for number, side in enumerate([*sides, 1]):
         found = fit_saturated(frame, start, knowns, side=side, tied=number == 0)
         if isinstance(found, LocalizationFailure):

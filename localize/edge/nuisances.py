@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from conespot.localize.edge.settings import EDGE
 from conespot.localize.edge.strips import Eliminated, Strips, strip_scores
 from conespot.localize.model.noise import NoiseModel
-from conespot.localize.model.residual import follows, log_residuals, rest, rms, student_weights
+from conespot.localize.model.residual import censored, follows, log_residuals, rest, rms, student_weights
 from conespot.localize.model.solve import inverse
 from conespot.localize.model.view import Shown
 
@@ -62,8 +62,13 @@ class Nuisances:
             self.white = rest(residual[steady], variance[steady], self.white)
         variance = variance + self.white**2
         whitened = residual / np.sqrt(variance)
-        self.weights = use / variance * student_weights(whitened)
         self.misfit = rms(whitened[use])
+        worth = use.astype(float)
+        if shown.clipped.any():
+            over, beyond = shown.clipped, -np.log(np.maximum(model[shown.clipped], 1e-6))
+            residual[over], worth[over] = censored(beyond, np.sqrt(variance[over]))
+            whitened = residual / np.sqrt(variance)
+        self.weights = worth / variance * student_weights(whitened)
         share = g / incident
         self.jacobian = np.concatenate(
             [share * rows, (share * light)[None], np.ones((1, len(model))), self.strips.slow]

@@ -201,8 +201,9 @@ def _power(series: Array) -> Array:
         weight = number / np.square(model)
         amounts = amounts * (weight * observed * both).sum(axis=3) / (weight * model * both).sum(axis=3)
     cost = np.sum(number * (np.log(model) + observed / model), axis=2)
-    # a second parameter is worth its cost (Akaike)
-    cost = cost + np.isfinite(_KNEES)
+    # before any frame is seen, that strips err alone is as likely as all knees together; and a second parameter has
+    # to be worth what it can fit of noise (Schwarz, Estimating the dimension of a model, Annals of Statistics 6, 1978)
+    cost = cost + np.isfinite(_KNEES) * (0.5 * np.log(number.sum()) + np.log(len(_KNEES) - 1.0))
     share = np.exp(cost.min(axis=1, keepdims=True) - cost)
     white, red = amounts * share / share.sum(axis=1, keepdims=True)
     smooth = white.sum(axis=1)[:, None] + red @ (1.0 / (1.0 + np.square(harmonic / _KNEES[:, None])))

@@ -11,6 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.fft import fftfreq, rfftfreq
 from scipy.linalg import cho_factor, cho_solve
 from scipy.linalg.lapack import dtrtri
 
@@ -36,6 +37,7 @@ class Modes:
     twice_x: Array  #: `[2 nx, w]`
     spectrum: Array  #: prior variances for amplitude 1 `[ny nx]`
     octave: NDArray[np.intp]  #: of each mode's wave number `[ny nx]`
+    bin_mm: float  #: side of a bin [mm]
 
     @classmethod
     def over(cls, height: int, width: int, bin_mm: float) -> Modes:
@@ -47,9 +49,19 @@ class Modes:
         k[0] = 1.0
         spectrum = k**-FIELD.exponent / (1.0 + (k / FIELD.knee) ** 2) / (sides[0] * sides[1])
         norm_y, norm_x = _norms(ny), _norms(nx)
-        octave = np.clip(np.floor(np.log2(k)).astype(np.intp) - _FIRST_OCTAVE, 0, _OCTAVES - 1)
         along_y, along_x = norm_y[:, None] * twice[0][:ny], norm_x[:, None] * twice[1][:nx]
-        return cls(along_y, along_x, twice[0], twice[1], spectrum, octave)
+        return cls(along_y, along_x, twice[0], twice[1], spectrum, _octave(k), bin_mm)
+
+    def density(self, shape: tuple[int, int], amplitudes: Array) -> Array:
+        """The albedo's power spectrum [mm2] at the waves of a real transform of `shape`; 0 at 0 and beyond the modes.
+
+        A window's modes have no slope at its sides, and no wave is longer than two of it. The albedo's are.
+        """
+        k = np.hypot(*np.meshgrid(rfftfreq(shape[1], self.bin_mm), fftfreq(shape[0], self.bin_mm)))
+        there = (k > 0.0) & (k <= 0.5 / (FIELD.bins_a_mode * self.bin_mm))
+        k = np.where(there, k, 1.0)
+        power = amplitudes[_octave(k)] * k**-FIELD.exponent / (1.0 + (k / FIELD.knee) ** 2)
+        return np.where(there, power, 0.0)
 
     def precision(self, amplitudes: Array) -> Array:
         """Prior precision of each mode `[ny nx]`."""
@@ -108,10 +120,15 @@ class Eliminated:
     gain: Array  #: the modes' reaction to the parameters `[modes, P]`
     offset: Array  #: the modes for unchanged parameters `[modes]`
     variances: Array  #: posterior variances of the modes `[modes]`
+    factor: tuple[Array, bool]  #: Cholesky's, of the modes' own normal equations
 
     def coefficients(self, step: Array) -> Array:
         """The modes after the parameters moved by `step` `[P]`."""
         return np.asarray(self.offset - self.gain @ step)
+
+    def fitted(self, right: Array) -> Array:
+        """The modes `[modes, Q]` of other data, whose weighted sums with the modes are `right` `[modes, Q]`."""
+        return np.asarray(cho_solve(self.factor, right))
 
 
 def eliminate(modes: Modes, weights: Array, jacobian: Array, data: Array, amplitudes: Array) -> Eliminated:
@@ -128,7 +145,13 @@ def eliminate(modes: Modes, weights: Array, jacobian: Array, data: Array, amplit
     gradient = flat @ y - right[:, :count].T @ solved[:, count]
     # the diagonal of the inverse is the sum of squares of the inverse factor's columns
     inverse = np.tril(dtrtri(factor[0], lower=1)[0])
-    return Eliminated(information, gradient, solved[:, :count], solved[:, count], np.sum(np.square(inverse), axis=0))
+    variances = np.sum(np.square(inverse), axis=0)
+    return Eliminated(information, gradient, solved[:, :count], solved[:, count], variances, factor)
+
+
+def _octave(k: Array) -> NDArray[np.intp]:
+    """Number of the octave that wave numbers [1/mm] are in."""
+    return np.clip(np.floor(np.log2(k)).astype(np.intp) - _FIRST_OCTAVE, 0, _OCTAVES - 1)
 
 
 def _cosines(count: int, size: int) -> Array:

@@ -8,6 +8,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from copy import copy
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -37,12 +38,22 @@ class FieldFit:
     pieces: tuple[Piece, ...]
     lead: int  #: which channel's light is measured
     gain: float  #: log of the spotlights' intensity over the ambient irradiance
-    information: Array  #: of the pose and the free quantities `[P, P]`, priors included
+    normal: Array  #: information of the pose, the free quantities and the gain `[P + 1, P + 1]`, priors included
+    prior: Array  #: what is known of the pose and the free quantities `[P, P]`
+    step: Array  #: the last `[P + 1]`
     misfit: float  #: rms of the lit bins' residuals, outliers cut, over what the model expects
     settled: bool  #: whether the last step was small
     lit_share: float  #: share of the predicted patches that the frame shows and that is not clipped
     knowns: Knowns  #: by which it was fitted
     contradicted: bool  #: whether the windows show what was taken as told to be otherwise
+
+    @cached_property
+    def covariance(self) -> Array:
+        """Covariance of the pose and the free quantities `[P, P]`: a sandwich (`field.sandwich`)."""
+        bread, size = inverse(self.normal), len(self.prior)
+        meat = sum((piece.scatter(self.step, bread) for piece in self.pieces), np.zeros_like(bread))
+        meat[:size, :size] += self.prior
+        return np.asarray((bread @ meat @ bread)[:size, :size])
 
 
 def fit_patch(
@@ -93,7 +104,7 @@ def fit_field(
         gain = before.gain
         for piece, coarse in zip(pieces, before.pieces, strict=True):
             piece.resume(coarse)
-    settled, prior, information = False, np.zeros((size, size)), np.eye(size + 1)
+    settled, prior, information, step = False, np.zeros((size, size)), np.eye(size + 1), np.zeros(size + 1)
     for count in range(level.iterations):
         if count:
             lights = [piece.bins.spotlight(estimate)[lead] for piece in pieces]
@@ -119,14 +130,14 @@ def fit_field(
         seen = [piece.bins.spotlight(estimate, doubted)[lead] for piece in pieces]
         # the pieces stay as they are
         doubt = _contradicted([copy(piece) for piece in pieces], seen, gain, estimate, nominal, (doubted, knowns))
-    own = information[size, :size]
-    data = information[:size, :size] - np.outer(own, own) / max(information[size, size], 1e-12) - prior
     return FieldFit(
         estimate,
         tuple(pieces),
         lead,
         gain,
-        prior + data / FIELD.not_gaussian,
+        information,
+        prior,
+        step,
         float(np.sqrt(np.mean([piece.misfit**2 for piece in pieces]))),
         settled,
         visible(estimate) * float(np.mean([piece.unclipped() for piece in pieces])),

@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 
 from conespot.localize.field.albedo import Modes, eliminate, even
 from conespot.localize.field.roughness import Roughness
+from conespot.localize.field.sandwich import albedo_scatter, rest_scatter
 from conespot.localize.field.settings import FIELD
 from conespot.localize.model.gain import gain_between
 from conespot.localize.model.noise import NoiseModel
@@ -125,7 +126,8 @@ class Piece:
         jacobian[size:] = self._chroma.reshape(len(self._chroma), full.size)
         weights = use / (sensor + self.roughness.variance(local))
         solved = eliminate(self._basis, weights, jacobian.reshape(-1, *shape), residual + self._albedo, self.amplitudes)
-        self._solved = solved
+        self._solved, self._jacobian, self._weights = solved, jacobian, weights
+        self._data, self._spectrum = residual + self._albedo, self.amplitudes
         own = solved.information[size:, size:] + np.eye(len(self._chroma)) / FIELD.chroma**2
         self._reaction = np.linalg.solve(own, solved.information[size:, :size])
         self._share = np.linalg.solve(own, solved.gradient[size:])
@@ -133,6 +135,27 @@ class Piece:
             solved.information[:size, :size] - solved.information[:size, size:] @ self._reaction,
             solved.gradient[:size] - solved.information[:size, size:] @ self._share,
         )
+
+    def scatter(self, step: Array, bread: Array) -> Array:
+        """Covariance of the gradient `[P + 1, P + 1]` as the residuals show it, where `step` leads `[P + 1]`.
+
+        `bread` `[P + 1, P + 1]` is the fit's covariance if its model is right.
+        """
+        solved, size, basis = self._solved, len(step), self._basis
+        every, (height, width) = self._jacobian.reshape(-1, *self._data.shape), self._data.shape
+        gain = solved.gain[:, :size] - solved.gain[:, size:] @ self._reaction
+        own = every[:size] - np.tensordot(self._reaction.T, every[size:], 1)
+        root = np.sqrt(self._weights)
+        rows = root * np.stack([row - basis.field(imitated) for row, imitated in zip(own, gain.T, strict=True)])
+        both = np.append(step, self._share - self._reaction @ step)
+        left = self._data - basis.field(solved.coefficients(both)) - np.tensordot(both, every, 1)
+        # always the same noise, so that a frame has one answer
+        noise = np.random.default_rng(0).standard_normal((FIELD.whites, height, width)) * (root > 0.0)
+        modes = solved.fitted(basis.project(root * noise))
+        moves = bread @ np.einsum("phw,nhw->pn", rows, noise)
+        white = noise - np.stack([root * basis.field(one) for one in modes.T]) - np.einsum("phw,pn->nhw", rows, moves)
+        known = self._reaction.T @ self._reaction / FIELD.chroma**2
+        return known + albedo_scatter(root * rows, basis, self._spectrum) + rest_scatter(rows, root * left, white)
 
     def move(self, step: Array, covariance: Array) -> None:
         """Take what a step `[P + 1]` of pose and log gain means for the albedo and its spectrum.

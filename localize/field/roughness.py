@@ -10,6 +10,7 @@ from dataclasses import dataclass
 
 import cv2
 import numpy as np
+import scipy.fft
 from numpy.typing import NDArray
 
 from conespot.localize.field.settings import FIELD
@@ -45,15 +46,29 @@ class Roughness:
 
     def variance(self, local: Array) -> Array:
         """What bins with the `local` variance of the rest count for, as if none shared it with a neighbour."""
-        return local * self.area * FIELD.farther
+        return local * self.area
 
 
 def _shared(residuals: Array, lit: NDArray[np.bool_]) -> float:
-    """Variance of means over blocks of whitened residuals, times the block's area, over the bins' own [bins]."""
-    residuals = np.clip(residuals, -FIELD.largest_shared, FIELD.largest_shared)
-    block = (FIELD.block, FIELD.block)
-    means = cv2.blur(residuals, block)[cv2.blur(lit.astype(float), block) > 0.99]
-    if len(means) < 2 * FIELD.block**2:
+    """How many bins share one rest: the sum of whitened residuals' autocorrelation over all distances [bins].
+
+    Up to where it first is no longer positive: the modes, and the mean that was taken off, have what is longer, and
+    leave waves that are turned round. A sum of n such bins has this many times the variance of n that share nothing.
+    """
+    residuals = np.where(lit, np.clip(residuals, -FIELD.largest_shared, FIELD.largest_shared), 0.0)
+    if np.count_nonzero(lit) < 2 * FIELD.near**2:
         return 1.0
-    single = float(np.var(residuals[lit]))
-    return max(1.0, FIELD.block**2 * float(np.var(means)) / max(single, 1e-12))
+    reach = FIELD.near
+    shape = tuple(scipy.fft.next_fast_len(side + reach, real=True) for side in lit.shape)
+    products, pairs = (
+        scipy.fft.irfft2(np.square(np.abs(scipy.fft.rfft2(plane, shape))), shape)[:reach, :reach]
+        for plane in (residuals, lit.astype(float))
+    )
+    distance = np.hypot(*np.mgrid[:reach, :reach])
+    ring = np.round(distance).astype(np.intp).ravel()
+    many = np.bincount(ring, np.maximum(pairs, 0.0).ravel())[:reach]
+    mean = np.bincount(ring, products.ravel())[:reach] / np.maximum(many, 1.0)
+    correlation = mean / max(float(mean[0]), 1e-12)
+    end = int(np.argmax(correlation <= 0.0)) or reach
+    bins = 2.0 * np.pi * np.arange(reach)  # of a ring
+    return 1.0 + float(np.sum(bins[1:end] * correlation[1:end]))

@@ -36,10 +36,6 @@ class FieldSettings:
     done_sigmas: float = 0.2
     #: how well the RCM counts as known while the axis is kept on it [mm]. Not critical
     tied_mm: float = 2e-3
-    #: an albedo with vessels is no Gaussian field: on fundus images, in green and at 850 nm, the squared errors of the
-    #: tip were this much larger, with the RCM and without, at 1000 and 5000 px. Widens ellipsoids only: with half of it
-    #: they hold 62 % instead of 88 % where a reference is given
-    not_gaussian: float = 1.7
 
     #: exponent and knee [cycles/mm] of the power spectrum of a fundus photograph's log albedo
     #: (doi 10.15347/wjm/2014.008): measured, see `field.albedo`. Not critical
@@ -78,8 +74,6 @@ class FieldSettings:
     #: bins a side over which the rest is measured: about a wave of the finest modes. 7 gain up to 20 %, 26 cost up to
     #: 56 %, but with a reference they gain 23 %
     near: int = 13
-    #: bins a side whose mean tells how far neighbours share their rest. Not critical
-    block: int = 5
     #: bins' worth of the whole patch's rest in what is measured around one. Not critical
     elsewhere: float = 20.0
     #: least local variance of the rest, over the patch's. A half costs 10 % with a reference, whose ellipsoids then
@@ -87,11 +81,10 @@ class FieldSettings:
     least_local: float = 0.5
     #: largest square of a bin's rest that counts: a vessel's. Not critical
     largest_excess: float = 1.0
+    #: draws of white noise that tell what a fit leaves of it: far better known than by the frame's one
+    whites: int = 8
     #: whitened rests count up to here where neighbours are compared. Not critical
     largest_shared: float = 4.0
-    #: the rest is correlated farther than the blocks tell: on fundus images, the largest factor that costs no accuracy.
-    #: Here 2 and 8 gain 17 % with a reference; 8 costs up to 13 % without
-    farther: float = 4.0
 
 
 FIELD = FieldSettings()

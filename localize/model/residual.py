@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.special import log_ndtr
 
 from conespot.localize.model.view import Shown
 
@@ -52,6 +53,22 @@ def log_residuals(shown: Shown, model: Array) -> tuple[Array, NDArray[np.bool_]]
     bound = shown.clipped & (model < 1.0)
     residual[bound] = -np.log(np.maximum(model[bound], 1e-6))
     return residual, bound
+
+
+def censored(beyond: Array, sigma: Array) -> tuple[Array, Array]:
+    """Residuals and the share of a measurement that they are worth, of bins of which only a bound is known.
+
+    The light is above white, which is `beyond` the model in its logarithm (negative where the model is above white
+    too), and a measurement would scatter by `sigma` (J. Tobin, Estimation of relationships for limited dependent
+    variables, Econometrica 26, 1958). The log likelihood is log Q(z) with z = beyond / sigma; its slope and curvature
+    are h / sigma and h (h - z) / sigma^2 with the hazard h = phi / Q. Bins that are as bright and yet measured err
+    downwards, and these make up for it.
+    """
+    z = beyond / sigma
+    hazard = np.exp(-0.5 * np.square(z) - 0.5 * math.log(2.0 * math.pi) - log_ndtr(-z))
+    # the difference is 1 / z for large ones, where rounding eats it
+    off = np.where(z < 1e3, hazard - z, 1.0 / np.maximum(z, 1e3))
+    return np.asarray(sigma / off), np.asarray(np.minimum(hazard * off, 1.0))
 
 
 def student_weights(residuals: Array) -> Array:
