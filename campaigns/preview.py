@@ -32,6 +32,8 @@ def preview(document: Document, out: Path | None) -> str:
     Large frames are rendered with fewer pixels. Raises InputError for a campaign that cannot be planned or renders no
     frames, RunError if this machine renders nothing.
     """
+    if out is not None and out.suffix.lower() != ".png":
+        raise InputError(f"--out {out}: the picture is a PNG; name a file that ends with .png")
     plan = make_plan(document)
     if not plan.cases:
         raise InputError(f"{document.source}: renders no frames, so there is nothing to preview")
