@@ -75,7 +75,10 @@ class Renderer:
         It is that of the whole core, and the mean over an exposure in which the tip sways as the pose says.
         With interreflection the light reaches the whole frame, and so does the tile. Where the retina spreads light it
         reaches all but `deep_light.LOST` of what comes back.
+        Raises ValueError where the scene moves and the pose does not say how: a still tile would look like any other.
         """
+        if self.scene.motion is not None and pose.sway is None:
+            raise ValueError("scene.motion: the pose does not move; take scene.pose(tip) in place of Pose.through")
         shape = self.scene.camera.shape
         crop = self.footprint(pose, spotlight) if self.scene.interreflection is None else Crop.whole(shape)
         axis = spotlight_axes(pose, self.scene.spotlights)[spotlight]

@@ -12,8 +12,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from conespot.scene.distortion import COEFFICIENTS
+from conespot.scene.distortion import COEFFICIENTS, LARGEST
 from conespot.scene.quantity import parse_quantity
+from conespot.scene.resolution import FEWEST, MOST
 from conespot.scene.text_file import read_text
 
 if TYPE_CHECKING:
@@ -71,11 +72,11 @@ def intrinsics(path: Path, sensor_width: float) -> dict[str, Any]:
         columns, rows = _size(storage, path)
         matrix = _matrix(storage, path)
         distortion = _coefficients(storage, path)
-    except (cv2.error, SystemError) as error:  # its Python binding lets malformed text out as a SystemError
-        cause = error.__cause__ or error
-        reason = " ".join(str(getattr(cause, "err", cause)).split())
+    except (cv2.error, SystemError):  # its Python binding lets malformed text out as a SystemError
+        # what OpenCV says of it is the name of one of its own variables or functions
         raise ValueError(
-            f"{path}: is no calibration as cv2.FileStorage writes it (YAML, JSON, XML): {reason}"
+            f"{path}: is no calibration as cv2.FileStorage writes it; it must be YAML that begins with %YAML:1.0, JSON"
+            " or XML, complete and well-formed"
         ) from None
     finally:
         cv2.utils.logging.setLogLevel(level)
@@ -112,7 +113,7 @@ def _numbers(name: str, node: FileNode, path: Path) -> NDArray[np.float64]:
     else:
         values = _listed(node)
     array = np.array([] if values is None else values, float)
-    if not array.size or not np.all(np.isfinite(array)) or np.any(np.abs(array) > 1e12):
+    if not array.size or not np.all(np.isfinite(array)) or np.any(np.abs(array) > LARGEST):
         raise ValueError(f"{path}: {name} holds no usable numbers")
     return array
 
@@ -134,6 +135,10 @@ def _size(storage: FileStorage, path: Path) -> tuple[int, int]:
         raise ValueError(f"{path}: image_width and image_height are missing; a calibration holds for one frame size")
     if len(sides) != 2 or any(side != round(side) for side in sides):
         raise ValueError(f"{path}: the frame's size must be two whole numbers, got {', '.join(map(str, sides))}")
+    if not all(FEWEST <= side <= MOST for side in sides):
+        raise ValueError(
+            f"{path}: frames of {sides[0]:g} x {sides[1]:g} pixels cannot be; a side has from {FEWEST} to {MOST}"
+        )
     return int(sides[0]), int(sides[1])
 
 

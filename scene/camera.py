@@ -55,6 +55,8 @@ class Camera(Model):
     [0.0, 0.0, -1.0]
     """
 
+    stand_ins = ("calibration",)
+
     resolution: Resolution = 5000  #: pixels a side, or width and height [px]
     sensor_width: Length = Field(36.0, gt=0.0)
     focal_length: Length = Field(300.0, gt=0.0)

@@ -14,6 +14,8 @@ from conespot.scene.model import Model
 Array = NDArray[np.float64]
 #: the coefficients in OpenCV's order
 COEFFICIENTS = ("k1", "k2", "p1", "p2", "k3")
+#: that a coefficient may be: a microscope's narrow view has large ones, since they go with powers of a small r
+LARGEST = 1e12
 #: tangent of the angle off the axis up to which a fold is looked for, in steps: beyond, no lens is described so
 _WIDEST, _STEPS, _AROUND = 2.0, 2000, 48
 #: Newton's steps, of which most lenses take three; the residual that is lost in rounding, and the one that is none
@@ -48,8 +50,10 @@ class Distortion(Model):
 
     @model_validator(mode="after")
     def _finite(self) -> Distortion:
-        if not np.all(np.isfinite(self.coefficients)):
-            raise ValueError("coefficients must be finite")
+        if not np.all(np.abs(self.coefficients) <= LARGEST):
+            raise ValueError(
+                f"coefficients must be finite, and at most {LARGEST:g}, got {max(self.coefficients, key=abs):g}"
+            )
         return self
 
     @property
@@ -85,7 +89,8 @@ class Distortion(Model):
         """The inverse of `distorted`, by Newton's method; NaN for what it puts nothing at."""
         x, y, left = to_x, to_y, np.inf
         for _ in range(_MOST_STEPS):
-            x, y, off = self._closer(x, y, to_x, to_y)
+            with np.errstate(over="ignore", invalid="ignore"):  # steps that lead away end as NaN
+                x, y, off = self._closer(x, y, to_x, to_y)
             before, left = left, float(np.max(off, initial=0.0, where=np.isfinite(off)))
             if left <= _CONVERGED or (left < 1e-10 and left >= before):
                 break

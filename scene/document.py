@@ -20,7 +20,8 @@ from ruamel.yaml.composer import Composer
 from ruamel.yaml.error import MarkedYAMLError, YAMLError
 from ruamel.yaml.nodes import MappingNode, Node, ScalarNode, SequenceNode
 
-from conespot.scene.quantity import FROM_FILE, in_unit_of
+from conespot.scene.complaint import complaint, cut, short
+from conespot.scene.quantity import FROM_FILE
 from conespot.scene.text_file import at_home, read_text
 
 T = TypeVar("T")
@@ -77,42 +78,9 @@ class Document:
             raise InputError(self._sentence(error, at)) from None
 
     def _sentence(self, error: ValidationError, at: Path_) -> str:
-        first = error.errors()[0]
-        # a discriminated union adds its tag to the location, which is no key of the file
-        keys: list[str | int] = list(at)
-        here: Any = self.data
-        for key in at:
-            here = here[key]
-        for part in first["loc"]:
-            inside = isinstance(here, dict) and part in here
-            inside |= isinstance(here, (list, tuple)) and isinstance(part, int) and part < len(here)
-            if inside:
-                keys.append(part)
-                here = here[part]
-            elif first["type"] == "missing" and part == first["loc"][-1]:
-                keys.append(part)
-        if first["type"] == "unknown_key":
-            keys.append(first["ctx"]["key"])
+        keys, said = complaint(error, self.data, at)
         name = ".".join(map(str, keys))
-        said = first["msg"].removeprefix("Value error, ")
-        if first["type"] == "missing":
-            said = "is required but missing"
-        elif first["type"] not in {"unknown_key", "unknown_name", "quantity", "value_error"}:
-            said = f"{said[0].lower()}{said[1:]}"
-            written, bound = here, next(iter(first.get("ctx", {}).values()), None)
-            if isinstance(written, str) and isinstance(bound, float):
-                # a bound reads best in the unit the value was written in
-                said = f"{said.removesuffix(str(bound).removesuffix('.0'))}{in_unit_of(written, bound)}"
-            said += f", got {_short(written if isinstance(written, (str, int, float)) else first['input'])}"
-        return f"{self.place(keys)}: {_cut(name) + ': ' if name else ''}{_cut(said, 400)}"
-
-
-def _short(value: object) -> str:
-    return _cut(repr(value), 60)
-
-
-def _cut(text: str, longest: int = 200) -> str:
-    return text if len(text) <= longest else f"{text[: longest - 3]}..."
+        return f"{self.place(keys)}: {cut(name) + ': ' if name else ''}{cut(said, 400)}"
 
 
 def read_document(path: Path) -> Document:
@@ -191,7 +159,7 @@ def _plain(yaml: YAML, node: Node, source: str, path: Path_, lines: dict[Path_, 
                 raise ValueError("more than any quantity")
             return value
         except ValueError:
-            raise InputError(f"{where}: {_short(node.value)} is not a valid value") from None
+            raise InputError(f"{where}: {short(node.value)} is not a valid value") from None
     if isinstance(node, SequenceNode) and node.tag == "tag:yaml.org,2002:seq":
         return [_plain(yaml, item, source, (*path, i), lines) for i, item in enumerate(node.value)]
     if isinstance(node, MappingNode) and node.tag == "tag:yaml.org,2002:map":

@@ -5,19 +5,21 @@ from __future__ import annotations
 import math
 from typing import Annotated
 
-from pydantic import Field
+from pydantic import Field, model_validator
 
 from conespot.scene.model import Model
+from conespot.scene.quantity import Share
 
-_Share = Annotated[float, Field(ge=0.0, le=0.1)]
+_Few = Annotated[Share, Field(ge=0.0, le=0.1)]
+_Deviation = Annotated[float, Field(ge=0.0, le=1e6)]
 
 
 class Nonuniformity(Model):
     """Standard deviations over a sensor's rows, columns and single pixels, which add up in the square."""
 
-    pixel: float = Field(0.0, ge=0.0)
-    row: float = Field(0.0, ge=0.0)
-    column: float = Field(0.0, ge=0.0)
+    pixel: _Deviation = 0.0
+    row: _Deviation = 0.0
+    column: _Deviation = 0.0
 
     @property
     def total(self) -> float:
@@ -39,6 +41,14 @@ class FixedPattern(Model):
     serial: int = Field(1, ge=0, lt=2**63)
     dsnu: Nonuniformity = Nonuniformity()  #: dark signal nonuniformity [e-]
     prnu: Nonuniformity = Nonuniformity()  #: photo response nonuniformity, relative
-    hot: _Share = 0.0  #: share of pixels that are hot
+    hot: _Few = 0.0  #: share of pixels that are hot
     hot_current: float = Field(1e5, ge=0.0, le=1e9)  #: their dark current on top of the sensor's [e-/s]
-    dead: _Share = 0.0  #: share of pixels that are dead
+    dead: _Few = 0.0  #: share of pixels that are dead
+
+    @model_validator(mode="after")
+    def _relative(self) -> FixedPattern:
+        if self.prnu.total > 0.5:
+            raise ValueError(
+                f"prnu is relative to the response: 0.01 is 1 %, 0.5 the most, got {self.prnu.total:g} in all"
+            )
+        return self

@@ -9,7 +9,7 @@ from pydantic import BeforeValidator, Field, model_validator
 
 from conespot.scene.model import Model, Words
 from conespot.scene.point_spread import PointSpread
-from conespot.scene.quantity import Length, format_quantity
+from conespot.scene.quantity import Length, Share, format_quantity
 
 
 class Lens(Model):
@@ -28,7 +28,7 @@ class Lens(Model):
     numerical_aperture: float = Field(0.0, ge=0.0, lt=1.0)  #: sine of the half angle; in place of `aperture`
     focus: Length = 0.0  #: height above the posterior pole of what is sharp [mm]
     blur: PointSpread = None  #: what is left of a point in focus, beside diffraction none
-    glare: float = Field(0.0, ge=0.0, lt=1.0)  #: share of the light in the frame that is spread evenly over it
+    glare: Share = Field(0.0, ge=0.0, lt=1.0)  #: share of the light in the frame that is spread evenly over it
 
     @model_validator(mode="after")
     def _one_aperture(self) -> Lens:

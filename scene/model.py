@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import difflib
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, ClassVar, get_args
 
 from pydantic import BaseModel, ConfigDict, GetCoreSchemaHandler, GetJsonSchemaHandler, model_validator
 from pydantic.json_schema import JsonSchemaValue
@@ -15,17 +15,42 @@ from pydantic_core import CoreSchema, PydanticCustomError, core_schema
 class Model(BaseModel):
     """A frozen description. An unknown key is refused with the nearest known one."""
 
-    model_config = ConfigDict(frozen=True, extra="forbid", arbitrary_types_allowed=True)
+    model_config = ConfigDict(frozen=True, extra="forbid", arbitrary_types_allowed=True, allow_inf_nan=False)
+
+    #: keys that a file may have in place of others, which they stand for
+    stand_ins: ClassVar[tuple[str, ...]] = ()
 
     @model_validator(mode="before")
     @classmethod
     def _known_keys(cls, data: Any) -> Any:
         if isinstance(data, dict):
             known = cls.model_fields  # once: a journal has millions of keys
-            for key in data:
+            for key, value in data.items():
                 if key not in known:
-                    raise unknown_key(str(key), list(known))
+                    raise unknown_key(str(key), [*known, *cls.stand_ins])
+                if _holds_truth(value) and _is_number(known[key].annotation):
+                    raise PydanticCustomError(
+                        "no_number", "expected a number, got {value}", {"key": key, "value": str(value).lower()}
+                    )
         return data
+
+
+def _holds_truth(value: Any) -> bool:
+    """Whether a value is `true` or `false`, or a list with such; pydantic would take them for 1 and 0."""
+    return type(value) is bool or (type(value) in (list, tuple) and any(map(_holds_truth, value)))
+
+
+def _is_number(annotation: Any) -> bool:
+    """Whether a type is that of numbers, alone or in a list, and of no truth value."""
+    kinds = list(_alone(annotation))
+    return any(kind in (int, float) for kind in kinds) and bool not in kinds
+
+
+def _alone(annotation: Any) -> Iterator[Any]:
+    if not get_args(annotation):
+        yield annotation
+    for part in get_args(annotation):
+        yield from _alone(part)
 
 
 def unknown_key(key: str, known: list[str]) -> PydanticCustomError:

@@ -19,6 +19,8 @@ from conespot.scene.model import Model, Words
 from conespot.scene.quantity import Dioptres, Length, format_quantity
 from conespot.scene.refraction import Interface, Root, Vector, through, to_plane
 
+#: of a pupil [mm]: drugs leave one of a millimetre; through less, a microscope sees a few pixels or none
+_NARROWEST = 0.5
 #: thickness in the middle of the flat contact lens [mm]; it shifts the image by a third of that
 _CONTACT = 1.0
 #: intraocular lens: front and back radius, thickness, and how far behind the front of the cornea it stands [mm]
@@ -107,6 +109,11 @@ class Optics(Model):
 
     @model_validator(mode="after")
     def _known(self) -> Optics:
+        if self.pupil < _NARROWEST:
+            narrowest = format_quantity(_NARROWEST, "length")
+            raise ValueError(
+                f"pupil: no eye's is narrower than {narrowest}, got {format_quantity(self.pupil, 'length')}"
+            )
         if self.refraction != 0.0 and self.eye != "atchison":
             raise ValueError(f"the {self.eye} eye has no other refraction than 0 D; eye: atchison has any")
         if self.lens == "phakic" and self.model.lens is None:

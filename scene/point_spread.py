@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+import re
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
@@ -10,7 +12,7 @@ from pydantic import BeforeValidator, Field, ValidationInfo, model_validator
 
 from conespot.scene.csv_lines import CsvLine, csv_lines
 from conespot.scene.model import Model, Text, Words
-from conespot.scene.quantity import Length, Quantity, format_quantity, parse_quantity
+from conespot.scene.quantity import UNITS, Length, Quantity, format_quantity, parse_quantity
 from conespot.scene.text_file import at_home
 
 #: no residual spread is wider [mm]: what is more is glare
@@ -35,7 +37,7 @@ class GaussianSpread(Model):
 class TabulatedSpread(Model):
     """Measured: relative `values` per area at `radii` from the middle, linear between them and 0 beyond the last.
 
-    A file has them in its first two columns, radii in um.
+    A file has them in its first two columns, radii in um or in the unit that its header ends with.
     """
 
     kind: Literal["table"] = "table"
@@ -62,18 +64,42 @@ def _read(path: Path) -> dict[str, Any]:
     """Radii and values of a CSV file. Raises ValueError with file and line for anything else."""
     pairs: list[tuple[float, float]] = []
     header: CsvLine | None = None
+    unit = 1e-3
     for line in csv_lines(path, "point spread"):
         try:
-            pairs.append((1e-3 * line.value(0), line.value(1)))
+            radius, value = line.value(0), line.value(1)
         except ValueError as error:
             if pairs or header is not None:
                 example = "expected a radius in um and a value, as in `2.5, 0.8`"
                 raise ValueError(f"{path}:{line.number}: {example} ({error})") from None
-            header = line
+            header, unit = line, _unit(path, line)
+            continue
+        if not (0.0 <= unit * radius <= WIDEST and 0.0 <= value < math.inf):
+            raise ValueError(
+                f"{path}:{line.number}: radii are from 0 to {format_quantity(WIDEST, 'length')} and values 0 or more,"
+                f" got {', '.join(line.cells[:2])}"
+            )
+        pairs.append((unit * radius, value))
         if len(pairs) > _MOST_POINTS:
             raise ValueError(f"{path}:{line.number}: more than {_MOST_POINTS} lines")
-    radii, values = zip(*pairs, strict=True) if pairs else ((), ())
+    if len(pairs) < 2:
+        raise ValueError(f"{path}: a point spread needs at least two lines of radius and value, got {len(pairs)}")
+    radii, values = zip(*pairs, strict=True)
     return {"radii": [format_quantity(radius, "length") for radius in radii], "values": list(values)}
+
+
+def _unit(path: Path, header: CsvLine) -> float:
+    """Of the radii below a header [mm]: um, or what the name of its first column ends with (`radius_mm`)."""
+    words = re.findall(r"[^\W\d_]+", header.cells[0])
+    if len(words) < 2:
+        return UNITS["length"]["um"]
+    unit = words[-1].replace("\N{MICRO SIGN}", "u").replace("\N{GREEK SMALL LETTER MU}", "u")
+    if unit not in UNITS["length"]:
+        raise ValueError(
+            f"{path}:{header.number}: {header.cells[0][:40]!r} names no length; end it with one of"
+            f" {', '.join(UNITS['length'])}"
+        )
+    return UNITS["length"][unit]
 
 
 def _spread(value: Any, info: ValidationInfo) -> Any:

@@ -45,6 +45,9 @@ WRITTEN = {
     "speed": "mm/s",
     "frequency": "Hz",
 }
+_PERCENT = re.compile(r"\s*([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)\s*%\s*", re.ASCII)
+#: a value of a kind, where that is not "a" and its name
+_A = {"angle": "an angle", "irradiance": "an irradiance", "pixels": "a number of pixels"}
 _QUANTITY = re.compile(r"\s*([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)\s*([A-Za-z/0-9]+)\s*", re.ASCII)
 
 
@@ -58,20 +61,21 @@ def parse_quantity(value: object, kind: str, *, bare: bool = True) -> float:
     `bare` is False, and anything that is not finite.
     """
     units = UNITS[kind]
+    what = _A.get(kind, f"a {kind}")
     example = f"'{1 if kind == 'power' else 9} {WRITTEN[kind]}'"
     if isinstance(value, bool) or not isinstance(value, (int, float, str)):
-        raise ValueError(f"expected a {kind} such as {example}, got {value!r}")
+        raise ValueError(f"expected {what} such as {example}, got {value!r}")
     if isinstance(value, str):
         match = _QUANTITY.fullmatch(value)
         if match is None or match[2] not in units:
-            raise ValueError(f"expected a {kind} such as {example} (units: {', '.join(units)}), got {value!r}")
+            raise ValueError(f"expected {what} such as {example} (units: {', '.join(units)}), got {value!r}")
         number = float(match[1]) * units[match[2]]
     elif bare:
         number = float(value)
     else:
-        raise ValueError(f"{value!r} has no unit; write a {kind} such as {example} (units: {', '.join(units)})")
+        raise ValueError(f"{value!r} has no unit; write {what} such as {example} (units: {', '.join(units)})")
     if not math.isfinite(number):
-        raise ValueError(f"a {kind} must be finite, got {value!r}")
+        raise ValueError(f"{what} must be finite, got {value!r}")
     return number
 
 
@@ -105,6 +109,11 @@ class Quantity:
         return {"type": "string", "pattern": self.pattern, "examples": [f"1 {WRITTEN[self.kind]}"]}
 
 
+def _share(value: object) -> object:
+    match = _PERCENT.fullmatch(value) if isinstance(value, str) else None
+    return float(match[1]) / 100.0 if match else value
+
+
 def _quantity(kind: str) -> Any:
     def parse(value: object, info: ValidationInfo) -> float:
         from_file = bool(info.context and info.context.get(FROM_FILE))
@@ -131,6 +140,7 @@ if TYPE_CHECKING:
     Dioptres = float
     Speed = float
     Hertz = float
+    Share = float
 else:
     Length = _quantity("length")  #: [mm]
     Angle = _quantity("angle")  #: [rad]
@@ -142,3 +152,4 @@ else:
     Dioptres = _quantity("refraction")  #: [1/m]
     Speed = _quantity("speed")  #: [mm/s]
     Hertz = _quantity("frequency")  #: [1/s]
+    Share = Annotated[float, BeforeValidator(_share)]  #: 0.02, or in a file "2 %"

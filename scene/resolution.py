@@ -9,7 +9,8 @@ from pydantic import BeforeValidator, Field
 
 from conespot.scene.model import Text
 
-_FEWEST, _MOST = 16, 20000
+#: pixels a side
+FEWEST, MOST = 16, 20000
 
 
 def _resolution(value: object) -> object:
@@ -18,12 +19,12 @@ def _resolution(value: object) -> object:
         value = [int(match[1]), int(match[2])]
     if not isinstance(value, (list, tuple)):
         return value
-    whole = len(value) == 2 and all(type(side) is int and _FEWEST <= side <= _MOST for side in value)
+    whole = len(value) == 2 and all(type(side) is int and FEWEST <= side <= MOST for side in value)
     if not whole:
-        raise ValueError(f"give pixels a side, or [width, height], from {_FEWEST} to {_MOST}, got {list(value)!r}")
+        raise ValueError(f"give pixels a side, or [width, height], from {FEWEST} to {MOST}, got {list(value)!r}")
     return value[0] if value[0] == value[1] else tuple(value)
 
 
-_Side = Annotated[int, Field(ge=_FEWEST, le=_MOST)]
+_Side = Annotated[int, Field(ge=FEWEST, le=MOST)]
 #: pixels a side, or (width, height) [px]
 Resolution = Annotated[_Side | tuple[_Side, _Side], BeforeValidator(_resolution), Text(r"^\s*\d+\s*[xX×]\s*\d+\s*$")]

@@ -6,11 +6,11 @@ import functools
 import math
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import Field, model_validator
+from pydantic import BeforeValidator, Field, model_validator
 
 from conespot.scene import fundus
 from conespot.scene.beam import Beam, CyclesBeam
@@ -37,6 +37,12 @@ KNOWLEDGE = "knowledge"
 _SAME_RETINA = 0.01
 
 
+def _by_name(value: Any) -> dict[Any, Any]:
+    if not isinstance(value, dict):
+        raise ValueError(f"cameras have names: write cameras: {{left: {{...}}, right: {{...}}}}, got {value!r}")
+    return value
+
+
 class Scene(Model):
     """Eye, camera, instrument, light and sensor: what both the renderer and a localizer may know."""
 
@@ -55,7 +61,7 @@ class Scene(Model):
     interreflection: Globe | None = None
     motion: AnyMotion = None
     #: by name, all that look at the same instant, of which `camera` is one: a stereo pair's left and right
-    cameras: dict[str, Camera] = Field({}, max_length=8)
+    cameras: Annotated[dict[str, Camera], BeforeValidator(_by_name)] = Field({}, max_length=8)
 
     @model_validator(mode="before")
     @classmethod
@@ -63,8 +69,13 @@ class Scene(Model):
         if not (isinstance(data, dict) and isinstance(data.get("camera"), str)):
             return data
         cameras = data.get("cameras")
-        if not isinstance(cameras, dict) or data["camera"] not in cameras:
-            raise unknown_name(data["camera"], list(cameras or ()), "camera")
+        if not cameras:
+            raise ValueError(
+                f"camera: '{data['camera']}' would be one of cameras, and there are none; write them as"
+                f" cameras: {{{data['camera']}: {{...}}}}, or here the camera's own keys"
+            )
+        if data["camera"] not in _by_name(cameras):
+            raise unknown_name(data["camera"], [str(name) for name in cameras], "camera")
         return {**data, "camera": cameras[data["camera"]]}
 
     @model_validator(mode="after")
@@ -107,7 +118,7 @@ class Scene(Model):
     def _has_the_eye_in_focus(self) -> Scene:
         lowest = self.eye.radius * min(0.0, 1.0 - self.surface.semi_axes[2]) - self.surface.relief
         for camera in [self.camera, *self.cameras.values()]:
-            if camera.lens is None or camera.pupil == 0.0:
+            if camera.lens is None:
                 continue
             pupil = format_quantity(round(camera.pupil, 3), "length")
             if not lowest <= camera.lens.focus <= 2.0 * self.eye.radius - lowest:
@@ -116,6 +127,8 @@ class Scene(Model):
                     f"camera.lens.focus: {format_quantity(camera.lens.focus, 'length')} is {where} the eye; give the"
                     f" height above the posterior pole, from 0 mm to {format_quantity(2.0 * self.eye.radius, 'length')}"
                 )
+            if camera.pupil == 0.0:
+                continue
             if camera.pupil > camera.height:
                 raise ValueError(
                     f"camera.lens: an entrance pupil of {pupil} is wider than the working distance is long"

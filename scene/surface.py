@@ -42,6 +42,8 @@ class Surface(Model):
     bumps: tuple[Bump, ...] = Field((), max_length=10000)
     height_map: HeightMap | None = None
 
+    stand_ins = ("population",)
+
     @model_validator(mode="before")
     @classmethod
     def _of_population(cls, data: Any) -> Any:

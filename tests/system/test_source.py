@@ -180,6 +180,13 @@ def test_a_moving_core_is_seen_alike_whether_or_not_something_could_hide_it(monk
     assert tile.radiance.max() > 0.0
 
 
+@needs_jit
+def test_a_pose_that_stands_still_is_refused_in_a_scene_that_moves():
+    scene = scene_of(32, motion=Velocity(velocity=(10.0, 0.0, 0.0), exposure=0.008))
+    with pytest.raises(ValueError, match=r"take scene\.pose\(tip\)"):
+        Renderer(scene, samples=1).tile(Pose.through(TIP, scene.instrument.rcm), 0, seed=1)
+
+
 def test_without_a_jit_variant_a_core_is_refused_in_a_sentence():
     code = """
 from conespot.render import Renderer

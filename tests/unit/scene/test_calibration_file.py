@@ -81,6 +81,7 @@ def coefficients(values):
         (CALIBRATION.replace("distortion_coefficients", "lens"), "distortion_coefficients are missing"),
         (CALIBRATION.replace("image_height: 1080", ""), "image_width and image_height are missing"),
         (CALIBRATION.replace("1080", "1080.5"), "two whole numbers"),
+        (CALIBRATION.replace("image_width: 1920", "image_width: 0"), "frames of 0 x 1080 pixels cannot be"),
         ("", "is no calibration as cv2.FileStorage writes it"),
         ("not yaml: [", "is no calibration as cv2.FileStorage writes it"),
     ],

@@ -134,7 +134,7 @@ def test_what_a_lens_that_folds_outside_the_frame_would_bring_back_is_not_seen()
         ("resolution: [1920, 8]", "from 16 to 20000, got [1920, 8]"),
         ("resolution: 8", "greater than or equal to 16, got 8"),
         ("resolution: wide", "got 'wide'"),
-        ("principal_point: [3 mm, 4 mm]", "expected a pixels such as '9 px'"),
+        ("principal_point: [3 mm, 4 mm]", "expected a number of pixels such as '9 px'"),
         ("distortion: [0.1]", "give k1, k2, p1, p2 and perhaps k3"),
         ("distortion: {k4: 1}", "unknown key 'k4'"),
         ("distortion: {k1: .nan}", "must be finite"),

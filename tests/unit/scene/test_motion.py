@@ -74,6 +74,7 @@ def test_the_axis_goes_through_the_rcm_at_every_instant_and_the_pose_is_that_of_
         ({"motion": {"kind": "tremor", "exposure": 0.01}, "sensor": EMVA}, "motion.exposure is for sensors without"),
         ({"motion": {"kind": "velocity"}}, "Field required"),
         ({"motion": {"kind": "tremor", "frequency": 9.0, "bandwidth": 20.0}, "sensor": EMVA}, "at most twice"),
+        ({"motion": {"kind": "tremor", "bandwidth": 0.9}, "sensor": EMVA}, "greater than or equal to 1"),
         ({"motion": "tremor", "sensor": EMVA, "interreflection": {}}, "a still point of light: leave motion out"),
         ({"beam": {"kind": "hard", "source_diameter": 0.1}, "interreflection": {}}, "leave beam.source_diameter out"),
         ({"motion": "tremor", "sensor": EMVA, "instrument": {"shaft": {}}}, "leave instrument.shaft out"),
