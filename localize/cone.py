@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from conespot.localize.doubt import answered, noise_of
 from conespot.localize.edge.fit import fit_edge
+from conespot.localize.edge.sandwich import EdgeFit
 from conespot.localize.image import AnyImage, Frame, Reference
 from conespot.localize.model.estimate import Estimate
 from conespot.localize.model.knowns import Knowns
@@ -41,10 +42,13 @@ def edge_outcome(
 ) -> Outcome:
     """The localization from the edge fit near a start, or why it may not be believed."""
     fit = fit_edge(frame, start, knowns, noise, reference)
-    if isinstance(fit, LocalizationFailure):
-        return fit
+    return fit if isinstance(fit, LocalizationFailure) else judged_edge(fit, start.scene)
+
+
+def judged_edge(fit: EdgeFit, scene: Scene) -> Outcome:
+    """The localization from an edge fit in a scene, or why it may not be believed."""
     return judged(
-        fit.estimate, fit.covariance, start.scene, fit.knowns,
+        fit.estimate, fit.covariance, scene, fit.knowns,
         misfit=fit.misfit, covered=fit.covered, settled=fit.settled,
         suspicions=lambda: fit.suspicions(fit.knowns),
     )  # fmt: skip

@@ -69,8 +69,8 @@ def _smoothed(profile: Profile, w: Array, px: Array, py: Array, variance: Array,
     if wide.any():
         at = np.flatnonzero(wide)
         sharpness = -(px[at] ** 4 + py[at] ** 4) * (2.0 / 15.0 / 24.0)
-        ladder = _ladder(profile, w[at], np.sqrt(variance[at] + box[at]), range(-below, 8 - below))
-        found[:, at] = ladder[:4] + sharpness * ladder[4:]
+        rungs = ladder(profile, w[at], np.sqrt(variance[at] + box[at]), range(-below, 8 - below))
+        found[:, at] = rungs[:4] + sharpness * rungs[4:]
     if not wide.all():
         at = np.flatnonzero(~wide)
         found[:, at] = _differences(profile, w[at], px[at], py[at], variance[at], box[at], below)
@@ -84,18 +84,18 @@ def _differences(profile: Profile, w: Array, px: Array, py: Array, variance: Arr
     near = np.any(np.abs(w - profile.knots[:, None]) < reach, axis=0)
     found = np.zeros((4, len(w)))
     far = np.flatnonzero(~near)
-    found[:, far] = _ladder(profile, w[far], np.sqrt(variance[far] + box[far]), range(-below, 4 - below))
+    found[:, far] = ladder(profile, w[far], np.sqrt(variance[far] + box[far]), range(-below, 4 - below))
     at = np.flatnonzero(near)
     a, p, q = w[at], px[at], py[at]
     floor = np.maximum(1e-3 * np.maximum(p, q), 1e-9)
     p, q = np.maximum(p, floor), np.maximum(q, floor)
     sigma = np.maximum(np.sqrt(variance[at]), floor)
     for sign, corner in ((1.0, a + p + q), (-1.0, a + p - q), (-1.0, a - p + q), (1.0, a - p - q)):
-        found[:, at] += sign * _ladder(profile, corner, sigma, range(-2 - below, 2 - below)) / (4.0 * p * q)
+        found[:, at] += sign * ladder(profile, corner, sigma, range(-2 - below, 2 - below)) / (4.0 * p * q)
     return found
 
 
-def _ladder(profile: Profile, w: Array, sigma: Array, orders: range) -> Array:
+def ladder(profile: Profile, w: Array, sigma: Array, orders: range) -> Array:
     """Derivatives of some `orders`, negative ones antiderivatives, of the profile under Gaussians `[orders, N]`."""
     found = np.zeros((len(orders), len(w)))
     degrees = profile.jumps.shape[1]

@@ -59,6 +59,8 @@ _PARTS = tuple(slice(_OF * c, _OF * c + _OF) for c in range(3))  # of the state,
 OBSERVED = np.zeros((SEEN, SIZE))
 for _c in range(3):
     OBSERVED[_c, [_OF * _c, _OF * _c + 2]] = 1.0
+RATES = np.zeros((3, SIZE))
+RATES[:, 1:] = OBSERVED[:3, :-1]  # each is followed by its rate
 OBSERVED[3, 3 * _OF] = OBSERVED[4, 3 * _OF + 1] = 1.0
 
 
@@ -100,6 +102,11 @@ class Belief:
 
     def _innovation(self, noise: Array) -> Array:
         return np.asarray(OBSERVED @ self.covariance @ OBSERVED.T + noise)
+
+    @property
+    def velocity(self) -> Array:
+        """Of the tip `[3]` [mm/s], tremor and all."""
+        return np.asarray(RATES @ self.mean)
 
     def pose(self, scene: Scene) -> Pose:
         """The pose that is believed."""

@@ -14,23 +14,19 @@ from enum import Enum
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from conespot.localize.cone import edge_outcome
 from conespot.localize.distance import with_distance
-from conespot.localize.doubt import noise_of
-from conespot.localize.image import AnyImage, Frame, Reference, checked, linear_light
+from conespot.localize.image import AnyImage, Frame, Reference, checked
 from conespot.localize.locate import locate
 from conespot.localize.model.estimate import Estimate
 from conespot.localize.model.knowns import Knowns
-from conespot.localize.model.view import outline
 from conespot.localize.outcome import Localization, LocalizationFailure, Outcome
-from conespot.localize.photometric import patch_outcome
+from conespot.localize.tracking.follower import Follower
 from conespot.localize.tracking.process import OBSERVED, Belief, miss_of, seen_of
 from conespot.scene.document import InputError
-from conespot.scene.pose import Pose
 from conespot.scene.scene import Scene
 
 Array = NDArray[np.float64]
-_NEAR = {"cone": edge_outcome, "photometric": patch_outcome}
+_FITS = ("cone", "photometric")
 
 
 @dataclass(frozen=True)
@@ -43,11 +39,6 @@ class TrackingSettings:
     #: how long a motion tells where to look [s], and how far its tip may be off for that [mm]: a start is good to this
     longest_s: float = 0.1
     loosest_mm: float = 0.3
-    #: light just inside the outline over that just outside, without which nothing shines there
-    contrast: float = 1.1
-    #: where inside and outside are looked at, over the distance from the patch's middle to its outline
-    inside: float = 0.6
-    outside: float = 1.35
 
 
 TRACKING = TrackingSettings()
@@ -92,14 +83,15 @@ class Tracker:
         reference: ArrayLike | Reference | None = None,
     ) -> None:
         """`localizer` is `cone` or `photometric`, the others as `locate` takes them. Raises InputError for another."""
-        if localizer not in _NEAR:
-            raise InputError(f"tracking: '{localizer}' has no fit that starts from a pose; take {' or '.join(_NEAR)}")
+        if localizer not in _FITS:
+            raise InputError(f"tracking: '{localizer}' has no fit that starts from a pose; take {' or '.join(_FITS)}")
         if len(scene.spotlights) > 1:
             raise InputError("tracking: follows one spotlight; several have a roll, which no motion is known of")
         self.scene, self.localizer = scene, localizer
         self.knowns = (knowns or Knowns()).within(scene)
         self._reference = None if reference is None else Reference.of(reference, scene)
         self._miss = miss_of(self.knowns, scene)
+        self._follower = Follower(scene, localizer, self.knowns, self._reference)
         self._belief: Belief | None = None
         self._at = -math.inf
         self._seen_at = -math.inf
@@ -146,16 +138,20 @@ class Tracker:
         """The fit from where the motion leads, if it stays there."""
         frame = Frame(image, self.scene.sensor)
         start = Estimate(before.pose(self.scene), self.scene)
-        if self.scene.depth(start.pose.apex) <= 0.0 or not _shines(frame, start):
-            return LocalizationFailure("no light where the motion leads")
-        outcome = _NEAR[self.localizer](frame, start, self.knowns, noise_of(frame, None), self._reference)
-        if not isinstance(outcome, Localization) or outcome.covariance is None:
+        if self.scene.depth(start.pose.apex) <= 0.0:
+            return LocalizationFailure("the motion leads out of the eye")
+        outcome = self._follower.quick(frame, start, before.velocity, self._at)
+        if not self._goes_on(outcome, before):
+            outcome = self._follower.full(frame, start, self._at)
+        if self._goes_on(outcome, before):
             return outcome
-        if before.surprise(*seen_of(outcome, self.scene)) > TRACKING.gate:
-            return LocalizationFailure("the fit is not where the motion leads")
-        if not _shines(frame, Estimate(Pose(outcome.apex_mm, outcome.axis), self.scene)):
-            return LocalizationFailure("no light where the fit ends")
-        return outcome
+        return LocalizationFailure("no fit is where the motion leads")
+
+    def _goes_on(self, outcome: Outcome, before: Belief) -> bool:
+        """Whether an answer is where the motion leads."""
+        if not isinstance(outcome, Localization) or outcome.covariance is None:
+            return False
+        return before.surprise(*seen_of(outcome, self.scene)) <= TRACKING.gate
 
     def _learn(self, found: Localization, before: Belief | None, state: State) -> None:
         self._seen_at = self._at
@@ -173,20 +169,3 @@ class Tracker:
 def _spread(belief: Belief) -> float:
     """Standard deviation of the tip [mm]."""
     return math.sqrt(max(0.0, float(np.trace((OBSERVED @ belief.covariance @ OBSERVED.T)[:3, :3]))))
-
-
-def _shines(frame: Frame, at: Estimate) -> bool:
-    """Whether it is brighter inside the outline than outside, where the frame shows both."""
-    points = outline(at, 0, 24)
-    if len(points) < 8:
-        return False
-    middle = points.mean(axis=0)
-    means = []
-    for share in (TRACKING.inside, TRACKING.outside):
-        column, row = np.floor(middle + share * (points - middle)).astype(int).T
-        shown = (row >= 0) & (column >= 0) & (row < frame.pixels.shape[0]) & (column < frame.pixels.shape[1])
-        if np.count_nonzero(shown) < 4:
-            return False
-        light, _ = linear_light(frame.pixels[row[shown], column[shown]], frame.sensor)
-        means.append(float(np.median(light if light.ndim == 1 else light.sum(axis=1))))
-    return means[0] > TRACKING.contrast * max(means[1], 0.0)

@@ -6,8 +6,11 @@ from conespot.localize.model.forward import ambient_irradiance, light
 from conespot.localize.model.profile import Profile
 from conespot.localize.model.sight import look, window
 from conespot.scene import Pose, Scene
+from conespot.scene.beam import CyclesBeam
 from conespot.scene.camera import Camera
+from conespot.scene.lens import Lens
 from conespot.scene.motion import Tremor
+from conespot.scene.point_spread import GaussianSpread
 from conespot.scene.sensor import Linear
 
 #: of an exposure that are added up
@@ -15,14 +18,27 @@ INSTANTS = 5
 
 
 class MovingNeedle:
-    """A tip on a slow line with a tremor on it, filmed at 120 Hz with an exposure of 5 ms over an even retina."""
+    """A tip on a slow line with a tremor on it, filmed at 120 Hz with an exposure of 5 ms over an even retina.
 
-    rate_hz, exposure_s = 120.0, 0.005
+    The scene tells of the tremor's exposure; one of 0 s is sharp, and nothing to tell. `like_theatre` has the core and
+    the blur of `preset: theatre` as well.
+    """
 
-    def __init__(self, resolution=300, *, seed=1, noise=0.003, **parts):
-        self.scene = Scene(camera=Camera(resolution=resolution), sensor=Linear(white=1.0, bits=12), **parts)
+    rate_hz = 120.0
+
+    def __init__(self, resolution=300, *, seed=1, noise=0.003, exposure_s=0.005, like_theatre=False):
+        lens = Lens(blur=GaussianSpread(sigma=0.0057)) if like_theatre else None
+        self.scene = Scene(
+            camera=Camera(resolution=resolution, lens=lens),
+            beam=CyclesBeam(source_diameter=0.1 if like_theatre else 0.0),
+            sensor=Linear(white=1.0, bits=12),
+            motion=Tremor(rms=0.18, exposure=exposure_s) if exposure_s else None,
+        )
+        self.exposure_s = exposure_s
         self._rng = np.random.default_rng(seed)
-        self._seed, self._noise = seed, noise
+        # planes that are shifted at random: new ones for each frame take longer than all else
+        self._noise = [self._rng.normal(0.0, noise, (resolution, resolution)) for _ in range(8)]
+        self._seed = seed
         self._tremor = Tremor(rms=0.18)
         self._pixels = window(0, 0, resolution, resolution)
         self._sight = look(self.scene, self._pixels)
@@ -37,17 +53,20 @@ class MovingNeedle:
         """The frame `[H, W]` at mid-exposure `time` [s], 12 bits; `dark` without the spotlight."""
         signal = self._ambient.copy()
         if not dark:
-            for instant in np.linspace(-0.5, 0.5, INSTANTS) * self.exposure_s + time:
+            # the middles of equal parts of the exposure
+            parts = (np.arange(INSTANTS) + 0.5) / INSTANTS - 0.5 if self.exposure_s else np.zeros(1)
+            for instant in parts * self.exposure_s + time:
                 pose = Pose.through(self.tip(instant), self.scene.instrument.rcm)
                 rows, columns = self._reached(pose)
                 size = self.scene.camera.resolution
                 at = (np.arange(size * size).reshape(size, size)[rows, columns]).ravel()
                 sight = self._sight.part(at)
                 shone = light(sight, pose, self.scene, Profile.of(self.scene.beam))
-                signal[at] += np.nan_to_num(shone.value) * 3.0 / INSTANTS
+                signal[at] += np.nan_to_num(shone.value) * 3.0 / len(parts)
         size = self.scene.camera.resolution
-        noisy = signal + self._rng.normal(0.0, self._noise, signal.shape)
-        return np.clip(np.rint(4095.0 * noisy), 0, 4095).astype(np.uint16).reshape(size, size)
+        which, down, right = self._rng.integers(0, [len(self._noise), size, size])
+        noisy = signal.reshape(size, size) + np.roll(self._noise[which], (down, right), (0, 1))
+        return np.clip(np.rint(4095.0 * noisy), 0, 4095).astype(np.uint16)
 
     def _reached(self, pose):
         points = self.scene.camera.project(self.scene.outline(pose, 0, 48))

@@ -28,7 +28,7 @@ INNER_ROOMS = {
     "theory": {"model"},
     "frames": set(),
     # follows with the fits of the localizers, and searches as they do
-    "tracking": {"model", "cone", "photometric", "locate", "distance", "doubt"},
+    "tracking": {"model", "edge", "cone", "photometric", "locate", "distance", "doubt", "verdict"},
 }
 
 
