@@ -1,4 +1,4 @@
-"""Bins about a predicted outline, sorted by strip: what `edge.ribbon` makes of a whole patch, in a fifth of the time."""
+"""Bins about a predicted outline, sorted by strip: what `edge.ribbon` makes of a patch, in a fifth of the time."""
 
 from __future__ import annotations
 

@@ -99,7 +99,7 @@ class Follower:
                 self._carried, self._misfit = Carried.after(fit, edge_width(fit.estimate)), fit.misfit
                 self._asked_at = self._measured_at = time_s
         if isinstance(outcome, Localization) and not _shines(
-            frame, Estimate(Pose(outcome.apex_mm, outcome.axis), self._scene)
+            frame, Estimate(Pose(outcome.apex_mm, outcome.axis, outcome.roll or 0.0), self._scene)
         ):
             return LocalizationFailure("no light where the fit ends")
         return outcome

@@ -23,6 +23,7 @@ from conespot.localize.outcome import Localization, LocalizationFailure, Outcome
 from conespot.localize.tracking.follower import Follower
 from conespot.localize.tracking.process import OBSERVED, Belief, miss_of, seen_of
 from conespot.scene.document import InputError
+from conespot.scene.pose import Pose
 from conespot.scene.scene import Scene
 
 Array = NDArray[np.float64]
@@ -85,8 +86,6 @@ class Tracker:
         """`localizer` is `cone` or `photometric`, the others as `locate` takes them. Raises InputError for another."""
         if localizer not in _FITS:
             raise InputError(f"tracking: '{localizer}' has no fit that starts from a pose; take {' or '.join(_FITS)}")
-        if len(scene.spotlights) > 1:
-            raise InputError("tracking: follows one spotlight; several have a roll, which no motion is known of")
         self.scene, self.localizer = scene, localizer
         self.knowns = (knowns or Knowns()).within(scene)
         self._reference = None if reference is None else Reference.of(reference, scene)
@@ -95,6 +94,7 @@ class Tracker:
         self._belief: Belief | None = None
         self._at = -math.inf
         self._seen_at = -math.inf
+        self._roll = 0.0
 
     def track(self, image: ArrayLike, time_s: float) -> Tracked:
         """The pose in a frame `[H, W]` or `[H, W, 3]` taken at `time_s` [s].
@@ -137,7 +137,9 @@ class Tracker:
     def _followed(self, image: AnyImage, before: Belief) -> Outcome:
         """The fit from where the motion leads, if it stays there."""
         frame = Frame(image, self.scene.sensor)
-        start = Estimate(before.pose(self.scene), self.scene)
+        pose = before.pose(self.scene)
+        # of several spotlights the roll as well, of which no motion is known: it is the last one
+        start = Estimate(Pose(pose.apex, pose.axis, self._roll), self.scene)
         if self.scene.depth(start.pose.apex) <= 0.0:
             return LocalizationFailure("the motion leads out of the eye")
         outcome = self._follower.quick(frame, start, before.velocity, self._at)
@@ -154,7 +156,7 @@ class Tracker:
         return before.surprise(*seen_of(outcome, self.scene)) <= TRACKING.gate
 
     def _learn(self, found: Localization, before: Belief | None, state: State) -> None:
-        self._seen_at = self._at
+        self._seen_at, self._roll = self._at, found.roll or 0.0
         if found.covariance is None:
             self._belief = None
             return

@@ -12,6 +12,7 @@ from conespot.scene.lens import Lens
 from conespot.scene.motion import Tremor
 from conespot.scene.point_spread import GaussianSpread
 from conespot.scene.sensor import Linear
+from conespot.scene.spotlights import RIGS
 
 #: of an exposure that are added up
 INSTANTS = 5
@@ -26,11 +27,12 @@ class MovingNeedle:
 
     rate_hz = 120.0
 
-    def __init__(self, resolution=300, *, seed=1, noise=0.003, exposure_s=0.005, like_theatre=False):
+    def __init__(self, resolution=300, *, seed=1, noise=0.003, exposure_s=0.005, like_theatre=False, rig="single"):
         lens = Lens(blur=GaussianSpread(sigma=0.0057)) if like_theatre else None
         self.scene = Scene(
             camera=Camera(resolution=resolution, lens=lens),
             beam=CyclesBeam(source_diameter=0.1 if like_theatre else 0.0),
+            spotlights=RIGS[rig],
             sensor=Linear(white=1.0, bits=12),
             motion=Tremor(rms=0.18, exposure=exposure_s) if exposure_s else None,
         )
@@ -69,7 +71,8 @@ class MovingNeedle:
         return np.clip(np.rint(4095.0 * noisy), 0, 4095).astype(np.uint16)
 
     def _reached(self, pose):
-        points = self.scene.camera.project(self.scene.outline(pose, 0, 48))
+        outlines = [self.scene.outline(pose, k, 48) for k in range(len(self.scene.spotlights))]
+        points = self.scene.camera.project(np.concatenate(outlines))
         low = np.clip(np.floor(points.min(axis=0)).astype(int) - 4, 0, None)
         high = np.ceil(points.max(axis=0)).astype(int) + 4
         return slice(low[1], high[1]), slice(low[0], high[0])

@@ -76,6 +76,16 @@ def test_a_leap_is_no_motion_and_is_searched_for(film):
     assert np.linalg.norm(leapt.outcome.apex_mm - needle.tip(later)) < 0.05
 
 
+def test_three_spotlights_are_followed_with_their_roll():
+    needle = MovingNeedle(300, exposure_s=0.0, rig="triple")
+    tracker = Tracker(needle.scene)
+    runs = [tracker.track(needle.frame(k * STEP), k * STEP) for k in range(2)]
+    assert [tracked.state for tracked in runs] == [State.FOUND, State.FOLLOWED]
+    for tracked in runs:
+        assert tracked.outcome.roll is not None
+        assert off_mm(tracked, needle) < 4.0 * math.sqrt(np.trace(tracked.outcome.covariance[:3, :3]))
+
+
 def test_the_smoother_halves_what_errs_independently_and_leaves_what_all_frames_share():
     scene, rng, tremor = load_scene("paper"), np.random.default_rng(5), Tremor(rms=0.18)
     times = np.arange(240) * STEP
