@@ -12,6 +12,7 @@ from pathlib import Path
 from conespot.campaigns.answers import can_hold
 from conespot.campaigns.knowledge import Knowledge
 from conespot.campaigns.own_scene import described_scene
+from conespot.localize.blur import SharedBlur, shared_blur
 from conespot.localize.calibration import NAMES, QUANTITIES, Calibration, Width, calibrate
 from conespot.localize.frames.reader import read_frames
 from conespot.scene import InputError, Scene
@@ -32,7 +33,10 @@ _REMEDIES = {
     "rcm": "tips further apart to the sides and in height: their axes meet in the RCM",
 }
 #: what no sequence is asked about, and who says it
-_NEVER = "camera's tilt, azimuth and lens: take OpenCV's calibration of the microscope as camera: {calibration: FILE}"
+_NEVER = (
+    "camera's tilt, azimuth and lens: take OpenCV's calibration of the microscope as camera: {calibration: FILE}; deep"
+    " light: frames of a narrow spot on the same retina, or scene.retina from OCT and the lamp's wavelength"
+)
 _EXACT_MM = 1e-9
 #: kinds of quantities by the unit of a sigma
 _KINDS = {"deg": "angle", "mm": "length"}
@@ -56,8 +60,10 @@ def calibrate_own(
     if shape:
         width = replace(width, eye_radius_mm=_EXACT_MM, semi_axes_mm=SEMI_AXES_SIGMA_MM)
     found = calibrate(lambda: (frame.image for frame in read_frames(sources, scene)), scene, width=width)
-    said = [*_said(found), f"not asked: {_NEVER}"]
-    text = _file(scene, knowledge, found, said, width)
+    blur = shared_blur((frame.image for frame in read_frames(sources, scene)), found.applied(scene))
+    said = [*_said(found), *_said_of_blur(blur), *found.correlations().splitlines(), f"not asked: {_NEVER}"]
+    calibrated = found.applied(scene) if blur is None else blur.applied(found.applied(scene))
+    text = _file(calibrated, knowledge, found, said, width)
     read_scene(Document(str(out), _without_knowledge(text, out), folder=out.parent))  # what is written can be read
     write_atomically(out, text.encode())
     yield from said
@@ -72,8 +78,17 @@ def _said(found: Calibration) -> Iterator[str]:
         yield line if found.observable[quantity] else f"{line}; what would show it: {remedy}"
 
 
+def _said_of_blur(blur: SharedBlur | None) -> Iterator[str]:
+    """A line on the blur; what would show one where these frames do not."""
+    if blur is not None and blur.observable:
+        yield blur.statement()
+        return
+    said = "blur: not observable from this sequence" if blur is None else blur.statement()
+    yield f"{said}; what would show it: patches that are not clipped, or a slanted edge in focus (ISO 12233)"
+
+
 def _file(scene: Scene, knowledge: Knowledge, found: Calibration, said: Sequence[str], width: Width) -> str:
-    """The text of a scene's file: what was found in comments, the scene, and how well it is known."""
+    """The text of a calibrated scene's file: what was found in comments, the scene, and how well it is known."""
     known = {key: value for key, value in knowledge.model_dump(mode="json").items() if key.endswith("_sigma")}
     for quantity, sigma in zip(QUANTITIES, found.sigmas, strict=False):
         field = _field(quantity.known)
@@ -86,7 +101,7 @@ def _file(scene: Scene, knowledge: Knowledge, found: Calibration, said: Sequence
     lines = [f"# Written by `campaign calibrate` from {found.frames} frames, with standard deviations:"]
     lines += [textwrap.fill(line, _WIDTH, initial_indent="#   ", subsequent_indent="#     ") for line in said]
     lines += ["# What is not said here is as conespot has it by default; `campaign explain KEY` says what a key means."]
-    lines += [dump(essence(found.applied(scene))).rstrip(), "# how well the localizers may take it to be known"]
+    lines += [dump(essence(scene)).rstrip(), "# how well the localizers may take it to be known"]
     return "\n".join([*lines, dump({KNOWLEDGE: known})])
 
 

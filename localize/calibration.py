@@ -51,6 +51,8 @@ class CalibrationSettings:
     #: a frame whose step, squared, is this many times the median's is left out: a vessel or a glint misled it. No
     #: frame here was, halved or doubled
     outlier: float = 30.0
+    #: correlation from which on it is said: half of a variance is then another quantity's
+    correlated: float = 0.7
     #: how a single frame's fit is held to the common values: it only has to be well conditioned, and comes off again.
     #: Halved or doubled, values change by a hundredth of a sigma
     tight: Knowns = Knowns(  # noqa: RUF009  frozen
@@ -116,6 +118,18 @@ class Calibration:
             said = f"{number * factor:.4f} +- {sigma * factor:.4f} {unit}".rstrip()
             seen = self.observable[name]
             lines.append(f"{name}: {said}" if seen else f"{name}: not observable from this sequence ({said})")
+        return "\n".join(lines)
+
+    def correlations(self) -> str:
+        """One sentence for each pair of observable quantities that the sequence tells apart only in part."""
+        seen = [k for k, name in enumerate(NAMES) if self.observable[name] and self.sigmas[k] > _FIXED]
+        among = self.covariance / np.outer(self.sigmas, self.sigmas)
+        lines = [
+            f"{NAMES[i]} and {NAMES[k]}: correlation {among[i, k]:+.2f}"
+            for at, i in enumerate(seen)
+            for k in seen[at + 1 :]
+            if abs(among[i, k]) >= CALIBRATION.correlated
+        ]
         return "\n".join(lines)
 
     def applied(self, scene: Scene) -> Scene:

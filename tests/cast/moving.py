@@ -27,8 +27,11 @@ class MovingNeedle:
 
     rate_hz = 120.0
 
-    def __init__(self, resolution=300, *, seed=1, noise=0.003, exposure_s=0.005, like_theatre=False, rig="single"):
-        lens = Lens(blur=GaussianSpread(sigma=0.0057)) if like_theatre else None
+    def __init__(
+        self, resolution=300, *, seed=1, noise=0.003, exposure_s=0.005, like_theatre=False, blur_mm=0.0, rig="single"
+    ):
+        blur_mm = 0.0057 if like_theatre else blur_mm
+        lens = Lens(blur=GaussianSpread(sigma=blur_mm)) if blur_mm else None
         self.scene = Scene(
             camera=Camera(resolution=resolution, lens=lens),
             beam=CyclesBeam(source_diameter=0.1 if like_theatre else 0.0),

@@ -4,9 +4,12 @@ import math
 
 import numpy as np
 import pytest
+from moving import MovingNeedle
 from photographs import NOISE, fundus, photograph, scene_of
 
-from conespot.localize.calibration import NAMES, calibrate
+from conespot.localize.blur import shared_blur
+from conespot.localize.calibration import NAMES, Calibration, calibrate
+from conespot.localize.model.quantity import quantity
 from conespot.scene.beam import CyclesBeam, HardBeam
 
 
@@ -51,3 +54,23 @@ def test_one_spotlight_tells_neither_half_angle_nor_camera_height_and_says_so():
     assert not found.observable["camera_height"]
     assert found.applied(believed).camera == believed.camera
     assert "softness" not in found.statement()
+
+
+@pytest.mark.parametrize("blur_mm", [0.0, 0.06])
+def test_a_sequence_shows_the_lens_blur_that_its_scene_does_not_tell_and_claims_none_where_there_is_none(blur_mm):
+    needle = MovingNeedle(300, exposure_s=0.0, blur_mm=blur_mm)
+    sharp = needle.scene.model_copy(update={"camera": needle.scene.camera.model_copy(update={"lens": None})})
+    found = shared_blur([needle.frame(0.3 * k) for k in range(3)], sharp)
+    assert found.observable == (blur_mm > 0.0)
+    assert abs(found.variance - blur_mm**2) < 3.0 * found.sigma
+    assert quantity("blur").value(found.applied(sharp)) == pytest.approx(found.variance if blur_mm else 0.0)
+    assert ("not observable" in found.statement()) == (blur_mm == 0.0)
+
+
+def test_quantities_that_a_sequence_confounds_are_said_and_those_that_it_does_not_show_are_not():
+    covariance = np.diag(np.square([1e-3, 1e-9, 0.01, 0.1, 1e-9, 1e-9, 1e-9, 0.01, 0.01, 0.02]))
+    covariance[0, 2] = covariance[2, 0] = -0.9 * 1e-3 * 0.01
+    covariance[0, 3] = covariance[3, 0] = 0.8 * 1e-3 * 0.1
+    shown = {name: name != "camera_height" for name in NAMES}
+    found = Calibration(np.zeros(10), covariance, shown, 5)
+    assert found.correlations() == "half_angle and eye_radius: correlation -0.90"
