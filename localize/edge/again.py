@@ -165,7 +165,7 @@ class _Fit:
             information, gradient = self.prior.T @ self.prior, -self.prior.T @ pr
             parts: list[Eliminated] = []
             for channel, was in zip(self.channels, before.channels, strict=True):
-                channel.evaluate(self.irradiance, self.here.value, self.here.rows)
+                channel.evaluate(self.irradiance, self.here.value, self.here.rows, None)
                 if not turn:
                     channel.slow_spread = was.slow_spread
                 part = channel.eliminated(_ALL)

@@ -18,6 +18,7 @@ from conespot.localize.doubt import noise_of
 from conespot.localize.edge.again import Carried, can_follow, fit_again
 from conespot.localize.edge.band import BandFit
 from conespot.localize.edge.fit import fit_edge
+from conespot.localize.edge.sandwich import EdgeFit
 from conespot.localize.image import Frame, Reference, linear_light
 from conespot.localize.model.estimate import Estimate
 from conespot.localize.model.knowns import Knowns
@@ -82,6 +83,12 @@ class Follower:
         pose = Estimate(fit.estimate.pose, self._scene)
         return judged(pose, fit.covariance, self._scene, self._knowns, misfit=fit.misfit, covered=1.0, settled=True)
 
+    def begin(self, frame: Frame, found: Estimate, time_s: float) -> None:
+        """Take over what the next frame's quick fit needs from the frame of a pose that has been found."""
+        self._carried = None
+        if self._can_follow:
+            self._keep(fit_edge(frame, found, self._knowns, noise_of(frame, None)), time_s)
+
     def full(self, frame: Frame, start: Estimate, time_s: float) -> Outcome:
         """The localizer's own fit's answer."""
         self._carried = None
@@ -92,17 +99,19 @@ class Follower:
             outcome = patch_outcome(frame, start, self._knowns, noise, self._reference)
         else:
             fit = fit_edge(frame, start, self._knowns, noise, self._reference)
-            if isinstance(fit, LocalizationFailure):
-                return fit
-            outcome = judged_edge(fit, self._scene)
-            if outcome and self._can_follow and isinstance(fit, BandFit):
-                self._carried, self._misfit = Carried.after(fit, edge_width(fit.estimate)), fit.misfit
-                self._asked_at = self._measured_at = time_s
-        if isinstance(outcome, Localization) and not _shines(
-            frame, Estimate(Pose(outcome.apex_mm, outcome.axis, outcome.roll or 0.0), self._scene)
-        ):
-            return LocalizationFailure("no light where the fit ends")
+            outcome = fit if isinstance(fit, LocalizationFailure) else judged_edge(fit, self._scene)
+            if outcome and self._can_follow:
+                self._keep(fit, time_s)
+        if isinstance(outcome, Localization):
+            pose = Pose(outcome.apex_mm, outcome.axis, outcome.roll or 0.0)
+            if not _shines(frame, Estimate(pose, self._scene)):
+                return LocalizationFailure("no light where the fit ends")
         return outcome
+
+    def _keep(self, fit: EdgeFit | LocalizationFailure, time_s: float) -> None:
+        if isinstance(fit, BandFit):
+            self._carried, self._misfit = Carried.after(fit, edge_width(fit.estimate)), fit.misfit
+            self._asked_at = self._measured_at = time_s
 
     def _moving(self, velocity: Array) -> Scene:
         if not self._exposure:

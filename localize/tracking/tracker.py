@@ -131,6 +131,8 @@ class Tracker:
                 return State.FOLLOWED, outcome
         outcome = locate(image, self.scene, self.localizer, knowns=self.knowns, reference=self._reference)
         if isinstance(outcome, Localization):
+            pose = Pose(outcome.apex_mm, outcome.axis, outcome.roll or 0.0)
+            self._follower.begin(Frame(image, self.scene.sensor), Estimate(pose, self.scene), self._at)
             return State.FOUND, outcome
         return (State.LOST if before is None else State.COASTING), outcome
 
