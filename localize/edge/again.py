@@ -14,12 +14,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from conespot.localize.edge.band import BandFit
+from conespot.localize.edge.channel import Channel, Kept
 from conespot.localize.edge.fit import is_sharp
-from conespot.localize.edge.nuisances import Nuisances
 from conespot.localize.edge.quick import QuickBeam, QuickLight
 from conespot.localize.edge.rim import Rim
 from conespot.localize.edge.settings import EDGE
-from conespot.localize.edge.strips import Eliminated, Strips, score_covariance
+from conespot.localize.edge.strips import Strips, score_covariance
 from conespot.localize.image import Frame
 from conespot.localize.model.deep import Deep
 from conespot.localize.model.estimate import Estimate
@@ -34,7 +34,6 @@ from conespot.scene.scene import Scene
 
 Array = NDArray[np.float64]
 _POSE, _ALL = 5, 6  #: parameters of the pose, and with the blur
-_FIXED = 1e30  #: precision of what is not sought
 
 
 @dataclass(frozen=True)
@@ -65,7 +64,7 @@ AGAIN = AgainSettings()
 class Carried:
     """What one frame's fit leaves to the next."""
 
-    channels: tuple[Nuisances, ...]
+    channels: tuple[Kept, ...]
     width: float  #: of what spreads the image across the edge [px]
     #: covariance of the gradient in units of the information's Cholesky factor `[5, 5]`
     together: Array
@@ -76,7 +75,7 @@ class Carried:
         """From a fit of all levels near which outlines are `width` [px] wide."""
         information = fit.information[:_POSE, :_POSE]
         together = _whitened(information, information @ fit.covariance[:_POSE, :_POSE] @ information)
-        return None if together is None else cls(fit.channels, width, together, None)
+        return None if together is None else cls(tuple(map(Kept.of, fit.channels)), width, together, None)
 
 
 @dataclass(frozen=True, eq=False)
@@ -123,8 +122,7 @@ def fit_again(
         return None
     strips = Strips(rim.index, here.offset, rim.first, (slice(0, len(rim.first)),))
     channels = [
-        Nuisances(plane, strips, noise, side**2, was.gain, was.spread, was.smallest, white=was.white)
-        for plane, was in zip(shown, before.channels, strict=True)
+        Channel(plane, strips, noise, side**2, was, _ALL) for plane, was in zip(shown, before.channels, strict=True)
     ]
     fit = _Fit(beam, channels, ambient_irradiance(sight, scene), knowns, start, before.blur or 0.0, here)
     if not fit.run(before):
@@ -135,8 +133,8 @@ def fit_again(
     if newer is not None:
         together = (1.0 - AGAIN.fresh) * together + AGAIN.fresh * newer
     misfit = math.sqrt(sum(channel.misfit**2 for channel in channels) / len(channels))
-    contrast = min(_contrast(plane, strips.offset) for plane in shown)
-    carried = Carried(tuple(channels), fit.here.width * side, together, fit.kept_blur)
+    contrast = min(channel.contrast for channel in channels)
+    carried = Carried(tuple(channel.leave() for channel in channels), fit.here.width * side, together, fit.kept_blur)
     return Again(fit.at, _coloured(information, together), misfit, contrast, carried)
 
 
@@ -145,7 +143,7 @@ class _Fit:
     """Gauss-Newton steps of the pose, and of the blur where it is sought."""
 
     beam: QuickBeam
-    channels: list[Nuisances]
+    channels: list[Channel]
     irradiance: Array
     knowns: Knowns
     at: Estimate
@@ -163,22 +161,16 @@ class _Fit:
             pr, pj = prior_rows(self.at, scene, self.knowns)
             self.prior = np.pad(pj, ((0, 0), (0, _ALL - pj.shape[1])))
             information, gradient = self.prior.T @ self.prior, -self.prior.T @ pr
-            parts: list[Eliminated] = []
-            for channel, was in zip(self.channels, before.channels, strict=True):
-                channel.evaluate(self.irradiance, self.here.value, self.here.rows, None)
-                if not turn:
-                    channel.slow_spread = was.slow_spread
-                part = channel.eliminated(_ALL)
-                taken = reduction(part.information, _ALL)
-                information += taken @ part.information @ taken.T
-                gradient += taken @ part.gradient
-                parts.append(part)
+            for channel in self.channels:
+                more, slope = channel.equations(self.irradiance, self.here.value, self.here.rows)
+                information += more
+                gradient += slope
             self.information = information
             step = self._step(gradient)
             if step is None:
                 return False
-            for channel, part in zip(self.channels, parts, strict=True):
-                _learn(channel, part, step)
+            for channel in self.channels:
+                channel.learn(step)
             length = math.sqrt(float(step @ information @ step))
             if turn and length < AGAIN.enough:
                 if self.sought or not self._doubted(gradient):
@@ -226,24 +218,11 @@ class _Fit:
     def scatter(self) -> Array:
         """Covariance of the pose's gradient `[5, 5]` as the strips' residuals show it, priors included."""
         prior = self.prior[:, :_POSE]
-        known, scores, parts = prior.T @ prior, np.zeros((1, _POSE)), np.zeros((1, _POSE, _POSE))
+        total, scores, parts = prior.T @ prior, np.zeros((1, _POSE)), np.zeros((1, _POSE, _POSE))
         for channel in self.channels:
-            gradient, own = channel.scores()
-            whole = own.sum(axis=0)
-            precise = np.concatenate([[0.0 if self.sought else _FIXED], channel.precision])
-            whole[range(_POSE, len(whole)), range(_POSE, len(whole))] += precise
-            taken = reduction(whole, _POSE)
-            known = known + (taken[:, _POSE + 1 :] * channel.precision) @ taken[:, _POSE + 1 :].T
-            scores = scores + gradient @ taken.T / channel.follows
-            parts = parts + taken @ own @ taken.T
-        return score_covariance(self.channels[0].strips, scores, parts) + known
-
-
-def _learn(channel: Nuisances, part: Eliminated, step: Array) -> None:
-    """Take a step `[6]`, and what it means for a channel's gain, level and slow slopes."""
-    own = solved(part.information[_ALL:, _ALL:], part.gradient[_ALL:] - part.information[_ALL:, :_ALL] @ step)
-    rest = np.zeros(len(part.gradient) - _ALL) if own is None else np.clip(own, -1.0, 1.0)
-    channel.learn(part, np.concatenate([step, rest]))
+            gradient, own, known = channel.scores(_POSE)
+            scores, parts, total = scores + gradient, parts + own, total + known
+        return score_covariance(self.channels[0].strips, scores, parts) + total
 
 
 def _whitened(information: Array, scatter: Array) -> Array | None:
@@ -259,11 +238,3 @@ def _coloured(information: Array, together: Array) -> Array:
     """The covariance that belongs to it."""
     half = np.linalg.inv(np.linalg.cholesky(information))
     return np.asarray(half.T @ together @ half)
-
-
-def _contrast(shown: Shown, offset: Array) -> float:
-    """Median light deep inside a band over that outside."""
-    inside, outside = shown.usable & (offset < 0.7 * float(offset.min())), shown.usable & (offset > 1.0)
-    if not inside.any() or not outside.any():
-        return 0.0
-    return float(np.median(shown.signal[inside])) / max(float(np.median(shown.signal[outside])), 1e-9)

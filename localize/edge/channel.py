@@ -1,0 +1,184 @@
+"""What a fit that follows knows of one channel beside the pose: `edge.nuisances` with what a track lets it leave out.
+
+The likelihood is the same. Gain, spreads and scatter start where the last frame's fit left them: spreads are learnt once
+a frame, and which bins hold the edge is found once. No template, no light from under the retina.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from conespot.localize.edge.nuisances import Nuisances
+from conespot.localize.edge.settings import EDGE
+from conespot.localize.edge.strips import Strips, strip_scores
+from conespot.localize.model.noise import NoiseModel
+from conespot.localize.model.residual import RESIDUAL, follows, rest, rms
+from conespot.localize.model.solve import solved
+from conespot.localize.model.view import Shown
+
+Array = NDArray[np.float64]
+_STEEPEST = 50  #: one bin in so many is steeper than the one by which the others are judged
+
+
+@dataclass(frozen=True, eq=False)
+class Kept:
+    """What a channel leaves to the next frame, in the words of `Nuisances`."""
+
+    gain: float
+    spread: Array  #: `[2]`
+    smallest: Array  #: `[2]`
+    slow_spread: float
+    white: float
+
+    @classmethod
+    def of(cls, fitted: Nuisances) -> Kept:
+        """What a band's fit leaves."""
+        return cls(fitted.gain, fitted.spread, fitted.smallest, fitted.slow_spread, fitted.white)
+
+
+class Channel:
+    """A channel's bins about one outline, and the equations of `size` shared parameters."""
+
+    def __init__(self, shown: Shown, strips: Strips, noise: NoiseModel, pixels: int, was: Kept, size: int) -> None:
+        """Each bin has so many `pixels`."""
+        self._shown, self.strips, self._noise, self._pixels, self._size = shown, strips, noise, pixels, size
+        self.kept, self._spread, self._white, self._gain = was, was.spread, was.white, was.gain
+        self._slow_basis = strips.slow
+        self._slow = np.zeros(len(self._slow_basis))
+        self._levels = np.zeros((0, 2))
+        self._level = 0.0
+        own = [1e-9, 1e-9, *len(self._slow) * [was.slow_spread**-2]]
+        self._precision = np.array(own)
+        self._rows = np.empty((size + len(own), len(shown.signal)))
+        self._rows[size + 1] = 1.0
+        self._rows[size + 2 :] = self._slow_basis
+        self._steady: NDArray[np.bool_] | None = None
+
+    def equations(self, irradiance: Array, light: Array, rows: Array) -> tuple[Array, Array]:
+        """Information `[size, size]` and gradient `[size]`, all of the channel's own eliminated.
+
+        The spotlights' light is `light` `[N]` with derivatives `rows` `[size, N]`.
+        """
+        g, shown, strips = math.exp(self._gain), self._shown, self.strips
+        incident = irradiance + g * light
+        if not len(self._levels):
+            self._begin(incident)
+        own = self._levels[strips.index]
+        albedo = own[:, 0] + own[:, 1] * strips.offset
+        model = np.exp(self._level + self._slow @ self._slow_basis + albedo) * incident
+        residual = shown.signal / model - 1.0
+        wide = np.abs(residual) >= RESIDUAL.linear
+        if wide.any():
+            residual[wide] = np.log(np.maximum(1.0 + residual[wide], RESIDUAL.darkest))
+        variance = self._noise.variance(model) / (self._pixels * model * model)
+        self._scatter(residual, variance, rows[2] / incident)
+        variance += self._white**2
+        square = residual * residual / variance
+        weights = shown.usable * ((RESIDUAL.student + 1.0) / (RESIDUAL.student + square)) / variance
+        share = g / incident
+        self._rows[: self._size] = share * rows
+        self._rows[self._size] = share * light
+        self._whitened, self._residual, self._weights = residual / np.sqrt(variance), residual, weights
+        return self._eliminated(residual + albedo)
+
+    def _begin(self, brightness: Array) -> None:
+        usable = self._shown.usable.astype(float)
+        ratio = self.strips.sums(usable * np.maximum(self._shown.signal / brightness, 0.0))
+        number = self.strips.sums(usable)
+        overall = max(float(ratio.sum() / max(number.sum(), 1.0)), 1e-9)
+        mean = np.where(number > 0.0, ratio / np.maximum(number, 1.0), overall)
+        self._level = math.log(overall)
+        self._levels = np.zeros((len(mean), 2))
+        self._levels[:, 0] = np.log(np.clip(mean / overall, 0.05, 20.0))
+
+    def _scatter(self, residual: Array, variance: Array, pull: Array) -> None:
+        """What residuals scatter beyond the sensor's noise, from the bins that hold the edge."""
+        if self._steady is None:
+            steep = np.abs(pull)
+            at = len(steep) - 1 - len(steep) // _STEEPEST
+            self._steady = self._shown.usable & (steep > EDGE.steady * np.partition(steep, at)[at])
+        if np.count_nonzero(self._steady) > EDGE.fewest_bins:
+            self._white = rest(residual[self._steady], variance[self._steady], self._white)
+
+    def _eliminated(self, data: Array) -> tuple[Array, Array]:
+        size, strips, count = self._size, self.strips, len(self._rows)
+        columns = np.empty((2 * count + 5, len(data)))
+        weighted = columns[: count + 1]
+        np.multiply(self._rows, self._weights, out=weighted[:count])
+        np.multiply(data, self._weights, out=weighted[count])
+        np.multiply(weighted, strips.offset, out=columns[count + 1 : 2 * count + 2])
+        columns[-3] = self._weights
+        np.multiply(self._weights, strips.offset, out=columns[-2])
+        np.multiply(columns[-2], strips.offset, out=columns[-1])
+        sums = strips.sums(columns)
+        a, b, d = sums[-3] + self._spread[0] ** -2, sums[-2], sums[-1] + self._spread[1] ** -2
+        det = a * d - b * b
+        flat, sloped = sums[: count + 1], sums[count + 1 : 2 * count + 2]
+        self._solved = (d * flat - b * sloped) / det, (a * sloped - b * flat) / det
+        self._variance = float(np.mean(d / det)), float(np.mean(a / det))
+        normal = weighted @ self._rows.T
+        normal -= flat @ self._solved[0][:count].T + sloped @ self._solved[1][:count].T
+        self._information, self._gradient = normal[:count], normal[count]
+        own = np.arange(size, count)
+        self._information[own, own] += self._precision
+        self._gradient[size + 2 :] -= self._precision[2:] * self._slow
+        taken = np.linalg.solve(self._information[size:, size:], self._information[size:])
+        self._taken = taken[:, :size]
+        information = self._information[:size, :size] - self._information[:size, size:] @ self._taken
+        return information, self._gradient[:size] - self._taken.T @ self._gradient[size:]
+
+    def learn(self, step: Array) -> None:
+        """Take a step `[size]` of what is shared, and what it means for the channel's own."""
+        size = self._size
+        own = solved(self._information[size:, size:], self._gradient[size:] - self._information[size:, :size] @ step)
+        if own is not None:
+            step = np.concatenate([step, np.clip(own, -1.0, 1.0)])
+        else:
+            step = np.concatenate([step, np.zeros(len(self._precision))])
+        self._gain += float(step[size])
+        self._level += float(step[size + 1])
+        self._slow = self._slow + step[size + 2 :]
+        self._levels = np.stack([part[-1] - step @ part[:-1] for part in self._solved], axis=1)
+
+    def leave(self) -> Kept:
+        """What the next frame starts from; the spreads as this frame's levels have them (MacKay 1992)."""
+        squares, count = np.square(self._levels).sum(axis=0), len(self._levels)
+        known = np.maximum(count * (1.0 - np.array(self._variance) / self._spread**2), 1.0)
+        spread = np.clip(np.sqrt(squares / known), self.kept.smallest, EDGE.widest * self._spread)
+        return Kept(self._gain, spread, self.kept.smallest, self.kept.slow_spread, self._white)
+
+    @property
+    def misfit(self) -> float:
+        """Rms of the whitened residuals, gross ones cut."""
+        return rms(self._whitened[self._shown.usable])
+
+    @property
+    def contrast(self) -> float:
+        """Median light deep inside the band over that outside."""
+        offset, usable = self.strips.offset, self._shown.usable
+        inside, outside = usable & (offset < 0.7 * float(offset.min())), usable & (offset > 1.0)
+        if not inside.any() or not outside.any():
+            return 0.0
+        signal = self._shown.signal
+        return float(np.median(signal[inside])) / max(float(np.median(signal[outside])), 1e-9)
+
+    def scores(self, size: int) -> tuple[Array, Array, Array]:
+        """The strips' gradients `[S, size]` and informations `[S, size, size]` of the first `size` shared parameters.
+
+        And the covariance `[size, size]` of what the channel's own priors add to the gradient.
+        """
+        rows = np.concatenate([self._rows[:size], self._rows[self._size :]])
+        gradient, own = strip_scores(
+            self.strips, rows, self._residual, self._weights, self._levels, np.asarray(self._spread)
+        )
+        whole = own.sum(axis=0)
+        mine = np.arange(size, len(whole))
+        whole[mine, mine] += self._precision
+        taken = np.concatenate([np.eye(size), -np.linalg.solve(whole[size:, size:], whole[size:, :size]).T], axis=1)
+        known = (taken[:, size:] * self._precision) @ taken[:, size:].T
+        follow = follows(self._weights * np.square(rows[size]), self._whitened)
+        return gradient @ taken.T / follow, taken @ own @ taken.T, known
