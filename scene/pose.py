@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import math
 from dataclasses import dataclass
 
@@ -83,7 +84,14 @@ def tangents(axis: Array) -> tuple[Array, Array]:
     >>> [part.round(12).tolist() for part in tangents(np.array([0.0, 0.0, -1.0]))]
     [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0]]
     """
-    frame = Pose(np.zeros(3), axis).rotation()
+    return _tangents(np.asarray(axis, float).tobytes())
+
+
+@functools.lru_cache(maxsize=64)
+def _tangents(axis: bytes) -> tuple[Array, Array]:
+    """A fit asks for those of one axis a dozen times; nobody may write into them."""
+    frame = Pose(np.zeros(3), np.frombuffer(axis)).rotation()
+    frame.flags.writeable = False
     return frame[:, 0], frame[:, 1]
 
 

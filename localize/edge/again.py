@@ -159,7 +159,8 @@ class _Fit:
             if turn:
                 self.here = self.beam(self.at.pose, self.blur)
             pr, pj = prior_rows(self.at, scene, self.knowns)
-            self.prior = np.pad(pj, ((0, 0), (0, _ALL - pj.shape[1])))
+            self.prior = np.zeros((len(pj), _ALL))
+            self.prior[:, :_POSE] = pj
             information, gradient = self.prior.T @ self.prior, -self.prior.T @ pr
             for channel in self.channels:
                 more, slope = channel.equations(self.irradiance, self.here.value, self.here.rows)

@@ -1,7 +1,7 @@
 """What a fit that follows knows of one channel beside the pose: `edge.nuisances` with what a track lets it leave out.
 
-The likelihood is the same. Gain, spreads and scatter start where the last frame's fit left them: spreads are learnt once
-a frame, and which bins hold the edge is found once. No template, no light from under the retina.
+The likelihood is the same. Gain, spreads and scatter start where the last frame's fit left them: spreads are learnt
+once a frame, and which bins hold the edge is found once. No template, no light from under the retina.
 """
 
 from __future__ import annotations

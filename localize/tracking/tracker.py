@@ -145,8 +145,9 @@ class Tracker:
         if self.scene.depth(start.pose.apex) <= 0.0:
             return LocalizationFailure("the motion leads out of the eye")
         outcome = self._follower.quick(frame, start, before.velocity, self._at)
-        if not self._goes_on(outcome, before):
-            outcome = self._follower.full(frame, start, self._at)
+        if self._goes_on(outcome, before):
+            return outcome
+        outcome = self._follower.full(frame, start, self._at)
         if self._goes_on(outcome, before):
             return outcome
         return LocalizationFailure("no fit is where the motion leads")
