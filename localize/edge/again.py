@@ -74,7 +74,8 @@ class Carried:
     def after(cls, fit: BandFit, width: float) -> Carried | None:
         """From a fit of all levels near which outlines are `width` [px] wide."""
         information = fit.information[:_POSE, :_POSE]
-        together = _whitened(information, information @ fit.covariance[:_POSE, :_POSE] @ information)
+        # what else was free is as it was found, or told by the track
+        together = _whitened(information, fit.scatter()[:_POSE, :_POSE])
         return None if together is None else cls(tuple(map(Kept.of, fit.channels)), width, together, None)
 
 

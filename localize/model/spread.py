@@ -44,10 +44,8 @@ class Widths:
 
     @property
     def variance(self) -> Array:
-        """All of it."""
-        return np.asarray(self.lens + self.defocus + self.core + self.way + self.wall)
         """All of it; below zero where a way that is being sought takes off more than the others have."""
-        return np.asarray(self.lens + self.defocus + self.core + self.way)
+        return np.asarray(self.lens + self.defocus + self.core + self.way + self.wall)
 
     def average(self, least: Array | float, stretch: Array | float) -> Averaging:
         """Means over pixels of a profile whose variable rises by `stretch` of the cosine, at centres `[N]`.

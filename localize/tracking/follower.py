@@ -8,7 +8,7 @@ still show the scene's beam and wall.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -60,7 +60,9 @@ class Follower:
         """The scene's tremor, if it has one, is what the motion so far says of each frame."""
         self._scene, self._knowns, self._reference = scene, knowns, reference
         self._photometric = localizer == "photometric"
-        self._can_follow = not self._photometric and reference is None and can_follow(scene, knowns)
+        # how far a tremor goes in a frame, which each frame alone has to find, the track tells
+        self._told = replace(knowns, smear_sigma_mm=0.0)
+        self._can_follow = not self._photometric and reference is None and can_follow(scene, self._told)
         self._exposure = exposure_of(scene.motion, scene.sensor) if isinstance(scene.motion, Tremor) else 0.0
         self._carried: Carried | None = None
         self._misfit = math.inf
@@ -72,7 +74,7 @@ class Follower:
             return LocalizationFailure("nothing is carried over")
         renew = time_s - self._measured_at > FOLLOWER.sandwich_s
         near = Estimate(start.pose, self._moving(velocity))
-        fit = fit_again(frame, near, self._knowns, self._carried, noise_of(frame, None), renew=renew)
+        fit = fit_again(frame, near, self._told, self._carried, noise_of(frame, None), renew=renew)
         if fit is None or fit.contrast < FOLLOWER.contrast:
             return LocalizationFailure("the quick fit does not settle")
         if fit.misfit > min(FOLLOWER.worse * self._misfit, VERDICT.largest_misfit):
@@ -81,7 +83,7 @@ class Follower:
         if renew:
             self._measured_at = time_s
         pose = Estimate(fit.estimate.pose, self._scene)
-        return judged(pose, fit.covariance, self._scene, self._knowns, misfit=fit.misfit, covered=1.0, settled=True)
+        return judged(pose, fit.covariance, self._scene, self._told, misfit=fit.misfit, covered=1.0, settled=True)
 
     def begin(self, frame: Frame, found: Estimate, time_s: float) -> None:
         """Take over what the next frame's quick fit needs from the frame of a pose that has been found."""

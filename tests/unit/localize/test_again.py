@@ -37,7 +37,7 @@ def carried(needle):
 def again(needle, carried, pixels, tip, scene=None):
     frame, scene = Frame(pixels, needle.scene.sensor), scene or needle.scene
     start = Estimate(Pose.through(tip, scene.instrument.rcm), scene)
-    return fit_again(frame, start, Knowns().within(scene), carried, noise_of(frame, None))
+    return fit_again(frame, start, Knowns(smear_sigma_mm=0.0).within(scene), carried, noise_of(frame, None))
 
 
 @pytest.mark.parametrize("theatre", [False, True])
@@ -83,7 +83,7 @@ def test_a_motion_that_the_track_tells_is_no_error_and_one_that_nobody_tells_is_
     pixels, tip = needle.frame(time), needle.tip(time)
     motion = Velocity(velocity=tuple(velocity.tolist()), exposure=0.015)
     told = again(needle, carried, pixels, tip, needle.scene.model_copy(update={"motion": motion}))
-    untold = again(needle, carried, pixels, tip)
+    untold = again(needle, carried, pixels, tip, needle.scene.model_copy(update={"motion": None}))
     assert told.carried.blur is None
     assert untold is None or untold.carried.blur > 0.0
     sigma = np.sqrt(np.diag(told.covariance)[:3])
@@ -100,7 +100,7 @@ def test_where_it_cannot_tell_the_fit_of_all_levels_has_to_look(needle, carried)
 
 def test_what_it_does_not_model_is_left_to_the_localizers_own_fit():
     scene, knowns = MovingNeedle(300).scene, Knowns()
-    assert can_follow(scene, knowns.within(scene))
+    assert can_follow(scene, Knowns(smear_sigma_mm=0.0).within(scene))
     for parts in ({"beam": HardBeam()}, {"spotlights": RIGS["triple"]}):
         assert not can_follow(scene.model_copy(update=parts), knowns)
     assert not can_follow(scene.model_copy(update={"beam": CyclesBeam()}), Knowns(half_angle_sigma_deg=0.1))
