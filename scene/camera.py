@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from functools import lru_cache
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -18,7 +19,7 @@ from conespot.scene.model import Model, Text
 from conespot.scene.optics import SODIUM, AnyOptics
 from conespot.scene.quantity import Angle, Length, Quantity, parse_quantity
 from conespot.scene.rays import Rays
-from conespot.scene.refracted import found, refracted
+from conespot.scene.refracted import found, pitch, refracted
 from conespot.scene.resolution import Resolution
 
 Array = NDArray[np.float64]
@@ -154,10 +155,7 @@ class Camera(Model):
         0.00264
         """
         if self.optics is not None:
-            seen = self._unstopped(self.project(np.zeros(3)))
-            # as far from where the ray enters the vitreous as the pole is
-            moved = seen.origins_by_x + np.linalg.norm(seen.origins) * seen.directions_by_x
-            return float(np.linalg.norm(moved))
+            return _refracted_pitch(self.model_copy(update={"lens": None}))
         return self.height / self.focal_length_px
 
     def seeing(self, wavelength: float) -> Camera:
@@ -295,3 +293,9 @@ class Camera(Model):
         """Pixel coordinates `[..., 2]` [px] as (x, y), y down, on the plane at distance 1, where the lens put them."""
         (cx, cy), f = self.principal, self.focal_length_px
         return (pixels[..., 0] - cx) / f, (pixels[..., 1] - cy) / (f * self.pixel_aspect)
+
+
+@lru_cache(maxsize=16)
+def _refracted_pitch(camera: Camera) -> float:
+    """`pixel_pitch` through the eye's optics, whatever the lens: a fit asks often, and to trace it takes 30 ms."""
+    return pitch(camera._unstopped(camera.project(np.zeros(3))))

@@ -40,6 +40,14 @@ def refracted(optics: Optics, rays: Rays, wavelength: float, *, stopped: bool = 
     return Rays(origins[0], directions[0], by_x[0], by_y[0], by_x[1], by_y[1])
 
 
+def pitch(seen: Rays) -> float:
+    """How far apart on the wall neighbouring pixels of a row look [mm], of the pixel that sees the origin.
+
+    As far from where the ray enters the vitreous as the origin is.
+    """
+    return float(np.linalg.norm(seen.origins_by_x + np.linalg.norm(seen.origins) * seen.directions_by_x))
+
+
 def _entering(optics: Optics, origins: Array, directions: Array, wavelength: float) -> tuple[Array, Array, Array]:
     """`Optics.enter` for arrays `[..., 3]`."""
     o, d = np.broadcast_arrays(origins, directions / np.linalg.norm(directions, axis=-1, keepdims=True))
