@@ -3,8 +3,8 @@
 `python benchmarks/told_worlds.py ROWS.csv` renders frames with each effect alone and with all of them (`theatre`), and
 has `photometric` find their tips, told rightly, told wrongly (`WRONG` says how) and told nothing: that the world is
 `theatre-ideal`, its light and camera apart. The RCM is told with an error of 0.05 mm along each axis, which is also its
-sigma. `--poses N` frames a cell, `--columns N` px. What is in ROWS.csv is not measured again, so that the command can
-be stopped and given again with more poses. Printed: the matrix of docs/localizers.md.
+sigma. `--poses N` frames a cell, `--columns N` px, `--effects` by name. What is in ROWS.csv is not measured again, so
+that the command can be stopped and given again with more poses. Printed: the matrix of docs/localizers.md.
 """
 
 from __future__ import annotations
@@ -139,6 +139,7 @@ def main() -> None:
     parser.add_argument("rows", type=Path)
     parser.add_argument("--poses", type=int, default=8)
     parser.add_argument("--columns", type=int, default=960)
+    parser.add_argument("--effects", nargs="*", help="these alone; default: all")
     asked = parser.parse_args()
     rows: list[dict[str, Any]] = []
     if asked.rows.exists():
@@ -149,7 +150,7 @@ def main() -> None:
         writer = csv.DictWriter(stream, COLUMNS)
         if not rows:
             writer.writeheader()
-        every = list(worlds(asked.columns))
+        every = [w for w in worlds(asked.columns) if not asked.effects or w.effect in asked.effects]
         for world in every:
             missing = [n for n in range(asked.poses) if (world.effect, n, asked.columns) not in done]
             renderer = Renderer(world.true, samples=16, edge_samples=512) if missing else None

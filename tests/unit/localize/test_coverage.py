@@ -1,6 +1,7 @@
 """What stated sigmas rest on, and whether 95 % ellipsoids hold 95 % of the tips; `benchmarks/coverage.py` asks more."""
 
 import math
+from functools import lru_cache
 
 import numpy as np
 import pytest
@@ -15,6 +16,7 @@ from conespot.localize.model.forward import ambient_irradiance, light
 from conespot.localize.model.profile import Profile
 from conespot.localize.model.residual import censored
 from conespot.localize.model.sight import look, window
+from conespot.localize.theory.bounds import patch_pixels
 from conespot.scene.beam import CyclesBeam, HardBeam
 
 RCM_MM = 0.05
@@ -76,13 +78,23 @@ def test_clipped_bins_make_up_for_those_that_are_measured_because_noise_left_the
         assert np.all((worth >= 0.0) & (worth <= 1.0))
 
 
+@lru_cache
+def ground(side):
+    """What the pixels of a frame see, and the ambient light there."""
+    scene = scene_of(HardBeam(), resolution=side)
+    sight = look(scene, window(0, 0, side, side))
+    return sight.points.reshape(side, side, 3), ambient_irradiance(sight, scene).reshape(side, side)
+
+
 def electrons(scene, pose, texture):
     """What a frame collects, as the model of the light has it: each pixel's mean is exact."""
-    side = scene.camera.resolution
-    sight = look(scene, window(0, 0, side, side))
-    lit = light(sight, pose, scene, Profile.of(scene.beam)).value
-    incident = AMBIENT * ambient_irradiance(sight, scene) + PEAK * lit / np.quantile(lit[lit > 0.0], 0.998)
-    return (albedo(texture, sight.points) * incident).reshape(side, side)
+    points, ambient = ground(scene.camera.resolution)
+    pixels = patch_pixels(scene, pose)
+    value = light(look(scene, pixels), pose, scene, Profile.of(scene.beam)).value
+    lit = np.zeros_like(ambient)
+    column, row = pixels.astype(int).T
+    lit[row, column] = PEAK * value / np.quantile(value[value > 0.0], 0.998)
+    return albedo(texture, points) * (AMBIENT * ambient + lit)
 
 
 def brighter(signal, factor, seed):
