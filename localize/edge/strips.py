@@ -161,6 +161,8 @@ def score_covariance(strips: Strips, scores: Array, parts: Array) -> Array:
     information, one of `parts` `[S, P, P]`. What it says in each over its own sigma is a series around the outline,
     whose power in each harmonic tells how far neighbours err together.
     """
+    if not (np.isfinite(parts).all() and np.isfinite(scores).all()):
+        return np.full_like(parts[0], np.inf)  # a bin that looks past the wall or the lens is no witness
     scale = np.sqrt(np.maximum(np.einsum("spp->p", parts), 1e-300))
     values, vectors = np.linalg.eigh(parts / np.outer(scale, scale))
     values = np.maximum(values, 1e-12 * values.max())

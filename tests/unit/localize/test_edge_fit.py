@@ -182,3 +182,10 @@ def test_a_pixels_mean_of_the_profile_is_its_integral(beam, where, wide, high):
     step = 1e-5 * span
     sides = [profile.mean(w + s, p, q)[0][0] for s in (step, -step)]
     assert slope[0] * span == pytest.approx((sides[0] - sides[1]) / 2e-5, rel=2e-2, abs=2e-2)
+
+
+def test_strips_that_cannot_be_told_leave_no_covariance_and_no_error():
+    strips = Strips(np.arange(40), np.zeros(40), np.arange(40), (slice(0, 40),))
+    parts = np.tile(np.eye(2), (40, 1, 1))
+    parts[3, 0, 0] = np.nan
+    assert np.all(np.isinf(score_covariance(strips, np.ones((40, 2)), parts)))
