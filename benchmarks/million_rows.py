@@ -63,6 +63,7 @@ STEPS: dict[str, Callable[[Path], object]] = {
     "status": lambda folder: campaign(["status", str(folder / "run")]),
     "count": lambda folder: ((folder / "run/progress.json").write_text(_stale(folder)), STEPS["status"](folder)),
     "report": lambda folder: campaign(["report", str(folder / "run")]),
+    "again": lambda folder: campaign(["report", str(folder / "run")]),  # whose rows follow from the journal already
 }
 
 
@@ -102,6 +103,8 @@ def main() -> None:
             wall = f"{time.perf_counter() - begin:6.1f} s, {worked:6.1f} s of processor time"
             sys.stdout.write(f"{step:8} {wall}, peak {most}{after.ru_maxrss / 1024:.0f} MB\n")
             sys.stdout.flush()
+        page = folder / "run" / "report.html"
+        sys.stdout.write(f"report.html has {page.stat().st_size / 1e6:.1f} MB\n")
 
 
 if __name__ == "__main__":

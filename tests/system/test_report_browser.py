@@ -13,6 +13,8 @@ import pytest
 from conespot.campaigns.cropping import keep_crops
 from conespot.campaigns.session import report
 from conespot.campaigns.session import run_campaign as carry_out
+from conespot.results import load_run
+from conespot.results.report.beside import lay_beside
 
 pytestmark = pytest.mark.slow
 _OFFLINE = ("no-sandbox", "disable-gpu", "disable-background-networking", "disable-component-update", "disable-sync",
@@ -162,6 +164,27 @@ def test_everybody_can_read_it(opened, how, request):
     assert [(v["id"], v["nodes"][0]["html"][:200]) for v in found] == []
     # nothing sticks out sideways but what scrolls in itself
     assert page.evaluate("document.documentElement.scrollWidth <= innerWidth")
+
+
+def test_runs_side_by_side_can_be_read_too(chromium, page_of_a_run, tmp_path):
+    axe = pytest.importorskip("axe_playwright_python.sync_playwright")
+    run = load_run(page_of_a_run.parent)
+    place = tmp_path / "side_by_side.html"
+    place.write_bytes(lay_beside([run, run])[0])
+    page = chromium.new_context(viewport={"width": 1280, "height": 900}).new_page()
+    page.set_default_timeout(60_000)
+    complaints = []
+    page.on("console", lambda said: complaints.append(said.text) if said.type == "error" else None)
+    page.on("request", lambda asked: complaints.append(asked.url) if _outside(asked.url, place) else None)
+    page.goto(place.as_uri())
+    plot = _drawn(page, "#figures .plot")
+    low, high = plot.evaluate("plot => plot._fullLayout.yaxis.range")
+    tops = plot.evaluate("plot => plot.data.filter(t => t.yaxis === 'y').flatMap(t => t.upperfence)")
+    assert low == 0
+    assert max(tops) < high < 2 * max(tops)
+    _keep(page, "side_by_side")
+    assert [v["id"] for v in axe.Axe().run(page).response["violations"]] == []
+    assert complaints == []
 
 
 def test_the_reader_may_choose_the_other_colours(opened):
