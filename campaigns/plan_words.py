@@ -12,8 +12,10 @@ from numpy.typing import NDArray
 from conespot.campaigns.plan import Group, Plan
 from conespot.campaigns.variation import variation, wrapped
 from conespot.render.rim import rim_pixels
-from conespot.scene import Pose
+from conespot.scene import Pose, Scene
 from conespot.scene.exposure_limits import RetinalExposure, scene_exposure
+from conespot.scene.retina import Fundus
+from conespot.scene.words import assumed
 
 
 @dataclass(frozen=True)
@@ -24,6 +26,15 @@ class Pace:
     seconds_per_pixel: float = 0.73e-9  #: to expose a frame and localize it once
     seconds_per_scene: float = 1.7  #: to load a scene and compile its kernels
     background_rays: float = 4.0  #: samples a pixel of the view without spotlights, as `render.renderer` takes them
+    # what follows is from a background and two tiles of `theatre-ideal` at 640 x 360 px, still and with spread alone,
+    # and from those of `theatre-4k` in docs/reality.md: good to a factor of two or three
+    varied_background_rays: float = 16.0  #: those of a living fundus, or through an aperture
+    spread_sample: float = 0.9e-6  #: more for a sample of a background with light under the retina [s]
+    optics_sample: float = 0.6e-6  #: more for one through the eye's optics [s]
+    glow_pixel: float = 3.8e-6  #: deep light of a tile, a pixel [s]
+    glow_margin: float = 0.65  #: how far around a patch that is looked at [mm]
+    framed_pixel: float = 2e-6  #: the same through the eye's optics, where it is looked at in all of the frame [s]
+    fit: float = 1.0  #: a localization by a fit where the scene has such effects: 0.5 to 2 s in `theatre`
 
 
 PACE = Pace()
@@ -61,8 +72,17 @@ def describe(plan: Plan, workers: int) -> Iterator[str]:
         f"({len(plan.groups)} groups of cases)"
     )
     yield f"about {_duration(_seconds(plan) / workers)} on {workers} workers (on cores like those it was tuned on)"
+    yield from _effects(plan)
     yield from _exposures(plan)
     yield f"about {_memory(plan, workers) / 1e9:.1f} GB of memory, and {_disk(plan) / 1e6:.0f} MB of disk"
+
+
+def _effects(plan: Plan) -> Iterator[str]:
+    """Lens, motion and optics, in the words of a run's tables, where a case has any."""
+    for name, part in (("sensor", "transfer"), ("eye", "radius")):
+        having = [c.scene for c in plan.cases if c.scene.camera.lens or c.scene.motion or c.scene.camera.optics]
+        for said in dict.fromkeys(assumed(scene)[part] for scene in having):
+            yield from wrapped(name, said)
 
 
 def _memory(plan: Plan, workers: int) -> float:
@@ -101,13 +121,47 @@ def _seconds(plan: Plan) -> float:
         pixels = math.prod(group.scene.camera.shape)
         if group.scene_key not in seen:
             seen.add(group.scene_key)
-            total += PACE.seconds_per_scene + PACE.background_rays * pixels / PACE.rays_per_second
+            total += PACE.seconds_per_scene + _background(group.scene)
         poses = len(group.positions)
         spotlights = range(len(group.scene.spotlights))
         rays = [sum(tile_rays(group, group.pose(int(i)), k) for k in spotlights) for i in _spread(poses, 5)]
         traced, found = float(np.mean(rays)) / PACE.rays_per_second, group.rows * pixels * PACE.seconds_per_pixel
-        total += poses * (traced + found)
+        total += poses * (traced + found + len(spotlights) * _glow(group) + _fits(group))
     return total
+
+
+def _has_spread(scene: Scene) -> bool:
+    return isinstance(scene.retina, Fundus) and scene.retina.spread is not None
+
+
+def _background(scene: Scene) -> float:
+    """What a background takes [s]."""
+    varied = scene.retina.is_spectral or scene.camera.pupil > 0.0
+    samples = PACE.varied_background_rays if varied else PACE.background_rays
+    each = 1.0 / PACE.rays_per_second
+    each += PACE.spread_sample if _has_spread(scene) else 0.0
+    each += PACE.optics_sample if scene.camera.optics is not None else 0.0
+    return samples * math.prod(scene.camera.shape) * each
+
+
+def _glow(group: Group) -> float:
+    """What the deep light of a tile takes [s]; that of its middle pose stands for all."""
+    scene = group.scene
+    if not _has_spread(scene):
+        return 0.0
+    if scene.camera.optics is not None:
+        return math.prod(scene.camera.shape) * PACE.framed_pixel
+    edge = scene.camera.project(scene.outline(group.pose(len(group.positions) // 2), 0, points=32))
+    sides = np.ptp(edge, axis=0) + 2.0 * PACE.glow_margin / scene.camera.pixel_pitch
+    return float(np.prod(np.minimum(sides, scene.camera.shape[::-1]))) * PACE.glow_pixel
+
+
+def _fits(group: Group) -> float:
+    """What the fits of a pose take beyond a localization by pixels alone [s], where an effect is in their model."""
+    scene = group.scene
+    effects = scene.camera.optics, scene.camera.lens, scene.motion, scene.beam.source_diameter, _has_spread(scene)
+    fits = sum(not name.startswith("paper") for case in group.cases for name in case.localizers)
+    return PACE.fit * fits if any(effects) else 0.0
 
 
 def _spread(count: int, most: int) -> NDArray[np.int_]:

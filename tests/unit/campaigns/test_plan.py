@@ -240,3 +240,16 @@ def test_a_seed_of_the_campaign_that_is_swept_over_moves_nothing(plan):
     assert [tile_seed(p, u, 0) for p in (first, other) for u in p.units()] == 2 * [
         tile_seed(first, u, 0) for u in first.units()
     ]
+
+
+def test_a_plan_states_lens_motion_and_optics_in_a_tables_words_and_counts_what_they_cost(plan):
+    """By the clock of one worker, two poses of 96 px: a theatre's fits alone take 2 s more than its ideal world's."""
+    text = "scene: {{preset: {}, camera: {{resolution: 96}}}}\nposes: 2\nlocalizers: [cone]\n"
+    text += "trajectory: {{kind: helix, radius: 1.5 mm, start_height: 3 mm, pitch: 0.1 mm}}\n"
+    ideal, real = ("\n".join(describe(plan(text.format(name)), 1)) for name in ("theatre-ideal", "theatre"))
+    said = " ".join(real.split())
+    for words in ("glare 2 %", "hand tremor 0.182 mm rms", "navarro eye, phakic, flat contact lens, pupil 8 mm"):
+        assert words in said
+        assert words not in ideal
+    took = [float(re.search(r"about (\d+) s on 1 workers", found)[1]) for found in (ideal, real)]
+    assert took[1] >= took[0] + 2.0
