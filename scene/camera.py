@@ -154,9 +154,7 @@ class Camera(Model):
         >>> round(Camera().pixel_pitch, 5)
         0.00264
         """
-        return (
-            _traced_pitch(self.model_copy(update={"lens": None})) if self.optics else self.height / self.focal_length_px
-        )
+        return _traced(self.model_copy(update={"lens": None})) if self.optics else self.height / self.focal_length_px
 
     def seeing(self, wavelength: float) -> Camera:
         """The same camera, whose `rays` and `project` are those of a wavelength [nm] where none is named."""
@@ -296,6 +294,6 @@ class Camera(Model):
 
 
 @lru_cache(maxsize=16)
-def _traced_pitch(camera: Camera) -> float:
+def _traced(camera: Camera) -> float:
     """`pixel_pitch` through the eye's optics, whatever the lens: a fit asks often, and to trace it takes 30 ms."""
     return pitch(camera._unstopped(camera.project(np.zeros(3))))
