@@ -45,7 +45,8 @@ class Rim:
         cv2.fillPoly(mask, [np.round(2**_SHARE * (points - low)).astype(np.int32)], 1, shift=_SHARE)
         inside = cv2.distanceTransform(mask, cv2.DIST_L2, 5)
         outside = cv2.distanceTransform(1 - mask, cv2.DIST_L2, 5)
-        row, column = np.nonzero((inside < inner) & (outside < outer))
+        # both count from the centres of bins on the other side, half a bin beyond the outline
+        row, column = np.nonzero((inside < inner + 0.5) & (outside < outer + 0.5))
         if len(row) < EDGE.fewest_bins:
             return None
         middle = points.mean(axis=0) - low
