@@ -121,7 +121,7 @@ def test_a_machine_that_cannot_submit_jobs_is_said_before_anything_waits_for_the
 @pytest.mark.parametrize(
     ("text", "says"),
     [
-        ("kind: slurn\n", "cluster.yaml:1: input tag 'slurn'"),
+        ("kind: slurn\n", "cluster.yaml:1: unknown kind 'slurn'; did you mean 'slurm'?"),
         ("kind: local\nworkers: 0\n", "cluster.yaml:2: workers: input should be greater than or equal to 1"),
         ("kind: local\nworkers: 2\nposes: 3\n", "cluster.yaml:3: poses: unknown key 'poses'"),
         ("kind: slurm\ncores: 8\nmemory: 1 GB\ninsecure: true\n", "cluster.yaml:1: jobs: is required but missing"),

@@ -135,9 +135,9 @@ def test_values_that_are_not_the_sensors_are_refused_and_never_cut_off(frames, b
 def test_light_above_white_counts_as_white(frames, name):
     scene = frames.make_scene(sensor=Linear(bits=12))
     light = frames.frame(scene, scene.pose(TIP)).astype(float) / 4095.0
-    light[light > 0.5 * light.max()] = 1.0
-    bright = np.where(light == 1.0, 700.0, light)
-    found, clipped = locate(bright, scene, name), locate(light, scene, name)
+    light /= 0.5 * light.max()
+    bright, clipped = (np.where(light > 1.0, white, light) for white in (700.0, 1.0))
+    found, clipped = locate(bright, scene, name), locate(clipped, scene, name)
     assert found
     np.testing.assert_array_equal(found.apex_mm, clipped.apex_mm)
 
