@@ -90,13 +90,13 @@ def test_a_worker_that_is_killed_from_outside_costs_no_pose(plan, tmp_path):
     assert 1 <= len([note for note in notes if note.startswith("a worker was lost")]) <= 2
 
 
-def test_a_worker_that_leaks_is_replaced_by_its_nanny_and_costs_no_pose(plan, tmp_path):
+def test_a_worker_that_leaks_is_replaced_by_its_nanny_and_costs_no_pose(plan, tmp_path, caplog):
     machine = LocalMachine(kind="local", workers=2, memory="600 MB")
     errors, notes = do(plan, machine, tmp_path, "60 leaks")
     assert errors == {}
     assert len([note for note in notes if note.startswith("a worker was lost")]) == 1
-    # whoever had the batch is gone, and nobody did more than what was left of it again
-    assert len({name.name.split("-")[1] for name in tmp_path.glob("did-*")}) == 3
+    assert "Restarting worker" in caplog.text  # Dask's nanny; the new one may find all poses done
+    assert len({name.name.split("-")[1] for name in tmp_path.glob("did-*")}) in (2, 3)
 
 
 class Scheduling:
