@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from conespot.localize.edge.nuisances import Nuisances
+from conespot.localize.edge.nuisances import Nuisances, first_levels
 from conespot.localize.edge.settings import EDGE
 from conespot.localize.edge.strips import Strips, strip_scores
 from conespot.localize.model.noise import NoiseModel
@@ -66,7 +66,7 @@ class Channel:
         g, shown, strips = math.exp(self._gain), self._shown, self.strips
         incident = irradiance + g * light
         if not len(self._levels):
-            self._begin(incident)
+            self._level, self._levels = first_levels(shown, strips, incident, self._levels.shape[1])
         own = self._levels[strips.index]
         albedo = own[:, 0] + own[:, 1] * strips.offset
         model = np.exp(self._level + self._slow @ self._slow_basis + albedo) * incident
@@ -84,16 +84,6 @@ class Channel:
         self._rows[self._size] = share * light
         self._whitened, self._residual, self._weights = residual / np.sqrt(variance), residual, weights
         return self._eliminated(residual + albedo)
-
-    def _begin(self, brightness: Array) -> None:
-        usable = self._shown.usable.astype(float)
-        ratio = self.strips.sums(usable * np.maximum(self._shown.signal / brightness, 0.0))
-        number = self.strips.sums(usable)
-        overall = max(float(ratio.sum() / max(number.sum(), 1.0)), 1e-9)
-        mean = np.where(number > 0.0, ratio / np.maximum(number, 1.0), overall)
-        self._level = math.log(overall)
-        self._levels = np.zeros((len(mean), 2))
-        self._levels[:, 0] = np.log(np.clip(mean / overall, 0.05, 20.0))
 
     def _scatter(self, residual: Array, variance: Array, pull: Array) -> None:
         """What residuals scatter beyond the sensor's noise, from the bins that hold the edge."""

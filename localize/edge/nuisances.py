@@ -78,14 +78,7 @@ class Nuisances:
 
     def _begin(self, brightness: Array) -> None:
         """Take what bins show over the model's brightness `[N]` for the albedo."""
-        shown = self.shown
-        ratio = self.strips.sums(np.where(shown.usable, np.clip(shown.signal / brightness, 0.0, None), 0.0))
-        number = self.strips.sums(shown.usable.astype(float))
-        overall = max(float(ratio.sum() / max(number.sum(), 1.0)), 1e-9)
-        mean = np.where(number > 0, ratio / np.maximum(number, 1.0), overall)
-        self.level = math.log(overall)
-        self.levels = np.zeros((len(mean), len(self.spread)))
-        self.levels[:, 0] = np.log(np.clip(mean / overall, 0.05, 20.0))
+        self.level, self.levels = first_levels(self.shown, self.strips, brightness, len(self.spread))
         self.slow, self.slow_spread = np.zeros(len(self.strips.slow)), float(self.spread[1])
 
     @property
@@ -137,6 +130,17 @@ class Nuisances:
         known = max(float(np.sum(np.maximum(1.0 - variance / self.slow_level**2, 0.0))), 1.0)
         self.slow_level = float(np.clip(np.linalg.norm(slow) / math.sqrt(known), self.smallest[0], EDGE.level))
         return slow
+
+
+def first_levels(shown: Shown, strips: Strips, brightness: Array, own: int) -> tuple[float, Array]:
+    """Log albedo of all strips, and each one's `own` beyond it `[S, own]`: what bins show over a brightness `[N]`."""
+    ratio = strips.sums(np.where(shown.usable, np.clip(shown.signal / brightness, 0.0, None), 0.0))
+    number = strips.sums(shown.usable.astype(float))
+    overall = max(float(ratio.sum() / max(number.sum(), 1.0)), 1e-9)
+    mean = np.where(number > 0, ratio / np.maximum(number, 1.0), overall)
+    levels = np.zeros((len(mean), own))
+    levels[:, 0] = np.log(np.clip(mean / overall, 0.05, 20.0))
+    return math.log(overall), levels
 
 
 def gain_over(shown: Shown, irradiance: Array, light: Array, offset: Array, around: float) -> float:
