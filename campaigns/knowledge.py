@@ -19,7 +19,7 @@ from conespot.scene import Scene
 from conespot.scene.beam import Beam
 from conespot.scene.model import Model, Words
 from conespot.scene.quantity import Angle, Length, format_quantity
-from conespot.scene.retina import Fundus, Spread
+from conespot.scene.retina import Spread
 from conespot.scene.surface import AnySurface
 
 FREE = "free"
@@ -117,8 +117,8 @@ class Knowledge(Model):
             update["surface"] = self.surface
         if self.beam is not None:
             update["beam"] = self.beam
-        if isinstance(scene.retina, Fundus) and scene.retina.spread is not None:
-            update["retina"] = scene.retina.model_copy(update={"spread": self._spread(scene.retina.spread, rng)})
+        if scene.spread is not None:
+            update["retina"] = scene.retina.model_copy(update={"spread": self._spread(scene.spread, rng)})
         told_scene = scene.model_copy(update=update)
         return told_scene if self.blur is None else quantity("blur").write(told_scene, self.blur**2)
 

@@ -14,7 +14,6 @@ from conespot.campaigns.variation import variation, wrapped
 from conespot.render.rim import rim_pixels
 from conespot.scene import Pose, Scene
 from conespot.scene.exposure_limits import RetinalExposure, scene_exposure
-from conespot.scene.retina import Fundus
 from conespot.scene.words import assumed
 
 
@@ -130,16 +129,12 @@ def _seconds(plan: Plan) -> float:
     return total
 
 
-def _has_spread(scene: Scene) -> bool:
-    return isinstance(scene.retina, Fundus) and scene.retina.spread is not None
-
-
 def _background(scene: Scene) -> float:
     """What a background takes [s]."""
     varied = scene.retina.is_spectral or scene.camera.pupil > 0.0
     samples = PACE.varied_background_rays if varied else PACE.background_rays
     each = 1.0 / PACE.rays_per_second
-    each += PACE.spread_sample if _has_spread(scene) else 0.0
+    each += PACE.spread_sample if scene.spread is not None else 0.0
     each += PACE.optics_sample if scene.camera.optics is not None else 0.0
     return samples * math.prod(scene.camera.shape) * each
 
@@ -147,7 +142,7 @@ def _background(scene: Scene) -> float:
 def _glow(group: Group) -> float:
     """What the deep light of a tile takes [s]; that of its middle pose stands for all."""
     scene = group.scene
-    if not _has_spread(scene):
+    if scene.spread is None:
         return 0.0
     if scene.camera.optics is not None:
         return math.prod(scene.camera.shape) * PACE.framed_pixel
@@ -159,7 +154,7 @@ def _glow(group: Group) -> float:
 def _fits(group: Group) -> float:
     """What the fits of a pose take beyond a localization by pixels alone [s], where an effect is in their model."""
     scene = group.scene
-    effects = scene.camera.optics, scene.camera.lens, scene.motion, scene.beam.source_diameter, _has_spread(scene)
+    effects = scene.camera.optics, scene.camera.lens, scene.motion, scene.beam.source_diameter, scene.spread is not None
     fits = sum(not name.startswith("paper") for case in group.cases for name in case.localizers)
     return PACE.fit * fits if any(effects) else 0.0
 

@@ -91,7 +91,7 @@ def report(options: argparse.Namespace) -> Ending:
         if options.crops:
             raise InputError("--crops goes with one run folder; make the crops of each by itself")
         path, sentences = report_beside(options.folders, options.out)
-        _mention("\n".join([*sentences, f"{path}: both runs on one page"]))
+        _mention("\n".join([*sentences, f"{path}: the runs on one page"]))
         return Ending.DONE
     if options.out:
         raise InputError("--out goes with several run folders; the report of one stands in it, as report.html")

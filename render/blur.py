@@ -87,7 +87,7 @@ class Blur:
         return math.ceil(_FAR * max(self.in_rays)) if self.in_rays else 0
 
     def smoothed(self, image: Image) -> Image:
-        """A picture `[h, w, C]` without edges narrower than a pixel, or any that is not in the rays, without glare."""
+        """A picture `[h, w, C]` whose rays are not spread yet, spread by weights of whole pixels; without glare."""
         if self._weights is None:
             return image
         image = np.ascontiguousarray(image)

@@ -23,7 +23,7 @@ from conespot.scene.motion import AnyMotion, exposure_of
 from conespot.scene.pose import Pose, cone_rays
 from conespot.scene.power import Power
 from conespot.scene.quantity import format_quantity
-from conespot.scene.retina import Fundus, PhotoRetina, Retina
+from conespot.scene.retina import Fundus, PhotoRetina, Retina, Spread
 from conespot.scene.sensor import Sensor, Srgb8
 from conespot.scene.spectrum import Curve
 from conespot.scene.spotlights import RIGS, Instrument, Spotlights, spotlight_axes
@@ -153,7 +153,7 @@ class Scene(Model):
             raise ValueError(f"the surface rises or sinks by up to {surface.relief:g} mm, over half the eye's radius")
         if self.interreflection is not None and surface != Surface(bumps=surface.bumps):
             raise ValueError("interreflection is worked out in a sphere: leave semi_axes and height_map out of surface")
-        if self.interreflection is not None and isinstance(self.retina, Fundus) and self.retina.spread is not None:
+        if self.interreflection is not None and self.spread is not None:
             raise ValueError("interreflection and retina.spread: no rendering has both; leave one of them out")
         return self
 
@@ -167,6 +167,11 @@ class Scene(Model):
                 raise ValueError("motion: a visible shaft would have to move too; leave instrument.shaft out")
             exposure_of(self.motion, self.sensor)
         return self
+
+    @property
+    def spread(self) -> Spread | None:
+        """How light spreads under the retina, where it does."""
+        return self.retina.spread if isinstance(self.retina, Fundus) else None
 
     def through(self, name: str) -> Scene:
         """The scene as another of its `cameras` sees it at the same instant. Raises KeyError for no such camera."""
