@@ -14,7 +14,7 @@ from conespot.localize.edge.settings import EDGE, Level
 from conespot.localize.image import Frame, Reference
 from conespot.localize.model.estimate import Estimate
 from conespot.localize.model.knowns import Knowns
-from conespot.localize.model.noise import NoiseModel
+from conespot.localize.model.noise import NoiseModel, SensorNoise
 from conespot.localize.model.profile import Profile
 from conespot.localize.model.view import edge_width, outlines
 from conespot.localize.outcome import COVERED, UNCERTAIN, LocalizationFailure
@@ -84,12 +84,16 @@ def fit_edge(
     ]
     # What a compression leaves of so high an edge is nothing to measure. Nor can its few pixels that are neither dark
     # nor clipped be weighed where nobody states the camera's noise: through optics tips were 14 um off at a stated 3.
-    told = frame.sensor.noise
-    if told.electrons is not None and not told.compression > 0.0:
+    if _states(noise) and not frame.sensor.noise.compression > 0.0:
         found.append(_bands(frame, start, knowns, noise, reference, patch))
     # the brighter the light, the fewer pixels of the edge are neither dark nor clipped: then bands hold the tip less
     held = [fit for fit in found if isinstance(fit, EdgeFit) and fit.settled]
     return min(held, key=lambda fit: float(np.trace(fit.covariance[:3, :3])), default=found[0])
+
+
+def _states(noise: NoiseModel) -> bool:
+    """Whether a noise model knows more than how pixels are rounded."""
+    return not isinstance(noise, SensorNoise) or noise.electrons is not None
 
 
 def _bands(
