@@ -36,8 +36,10 @@ from conespot.scene.spread import Kernel, spread_kernel
 Array = NDArray[np.float64]
 Maps = NDArray[np.float32]
 
-#: side of a map's cell [mm]
+#: side of a map's cell [mm], at most
 CELL = 0.02
+#: cells along a spotlight's map, at least: where light goes less far, cells are smaller
+CELLS = 250
 #: share of the deep light that comes back further away than the maps reach
 LOST = 1e-3
 #: rays of a spotlight
@@ -79,7 +81,8 @@ class DeepLight:
         scene, beam = self.scene, self.scene.beam
         intensity = Power(value=1.0, convention=scene.power.convention).axial_intensity(beam) * _PER_M2
         centre, around = self._patch(pose, spotlight)
-        chart = Chart.about(scene, centre, around + self.reach, CELL)
+        half = around + self.reach
+        chart = Chart.about(scene, centre, half, min(CELL, 2.0 * half / CELLS))
         points = stands(scene, pose, spotlight)
         density = np.zeros((chart.side, chart.side))
         for point in points:
@@ -126,7 +129,7 @@ class DeepLight:
         for i, (wavelength, kernel) in enumerate(zip(self.wavelengths, self.kernels, strict=True)):
             entered = np.zeros_like(density, dtype=np.float32)
             entered[lit] = density[lit] * entry.passage(wavelength) / typical(wavelength)
-            transfer = _transfer(chart.side, kernel)
+            transfer = _transfer(chart, kernel)
             values[i] = _convolved(entered, transfer)
             if chart.stretch is not None:
                 # even light stays even where the surface has more area than the map
@@ -231,11 +234,13 @@ def _convolved(values: NDArray[np.float32], transfer: NDArray[np.float32]) -> ND
     return np.asarray(scipy.fft.irfft2(scipy.fft.rfft2(values) * transfer, s=values.shape), np.float32)
 
 
-def _transfer(side: int, kernel: Kernel) -> NDArray[np.float32]:
-    """The kernel's Fourier transform on the frequencies of `rfft2` of a chart: Gaussians are those of x times of y."""
-    down, along = (np.exp(-2.0 * (np.pi * kernel.widths[:, None] * f) ** 2) for f in _frequencies(side))
+def _transfer(chart: Chart, kernel: Kernel) -> NDArray[np.float32]:
+    """The kernel's Fourier transform on the frequencies of `rfft2` of a chart: Gaussians are those of x times of y.
+
+    Light is shared by four cells and read between four: each is a tent along x and y, of the variance cell^2 / 6. The
+    Gaussians have as much less, where they have it.
+    """
+    variances = np.maximum(np.square(kernel.widths) - chart.cell**2 / 3.0, 0.0)[:, None]
+    y, x = np.fft.fftfreq(chart.side, chart.cell), np.fft.rfftfreq(chart.side, chart.cell)
+    down, along = (np.exp(-2.0 * np.pi**2 * variances * np.square(f)) for f in (y, x))
     return np.asarray((kernel.parts[:, None] * down).T @ along, np.float32)
-
-
-def _frequencies(side: int) -> tuple[Array, Array]:
-    return np.asarray(np.fft.fftfreq(side, CELL), float), np.asarray(np.fft.rfftfreq(side, CELL), float)
