@@ -9,6 +9,7 @@ import pandas as pd
 from conespot.results.figure_kind import Cut
 from conespot.results.figures import Drawing
 from conespot.results.report.along import along
+from conespot.results.report.bounds import beside_bounds, error_budget
 from conespot.results.report.chart import Chart, Json
 from conespot.results.report.gap import gap
 from conespot.results.report.over_power import over_power, table_of
@@ -16,7 +17,7 @@ from conespot.results.report.path import paths, space
 from conespot.results.report.survey import accuracy, coverage
 from conespot.results.run import Run
 from conespot.results.style import KINDS
-from conespot.results.table import Block
+from conespot.results.table import Block, Table
 
 #: how a kind of figure is drawn to be touched; another kind is shown as the picture it is
 _TOUCHED: dict[str, Callable[[Cut], tuple[list[Json], Json, list[list[str]]]]] = {
@@ -67,6 +68,32 @@ def survey_charts(run: Run) -> dict[str, Chart]:
         title = "How many frames were localized, and why not the others"
         words = "Bars of the shares of frames. The table of refusals holds the numbers."
         found["coverage"] = Chart("survey-coverage", title, "", words, *covered)
+    return found
+
+
+def theory_charts(run: Run, theory: Sequence[Table]) -> list[Chart]:
+    """Bounds beside errors, and the error budget, as far as the run's rows or its folder's tables have them."""
+    found = []
+    said = (
+        (
+            beside_bounds(run, theory),
+            "bounds",
+            "Errors beside their Cramer-Rao bound",
+            "No unbiased localizer has a smaller root mean square error. Errors are those at the reference power; "
+            "bounds of the same frames hold over even albedo with what the localizer knows; those of campaign theory "
+            "are of one frame each, with the tip at two heights.",
+        ),
+        (
+            error_budget(theory),
+            "budget",
+            "Error budget",
+            "By how much an outline fit is off when one quantity is by the tolerance beside its name.",
+        ),
+    )
+    for drawn, name, title, caption in said:
+        if drawn is not None:
+            words = f"{title}, in micrometres. The tables hold the numbers."
+            found.append(Chart(f"theory-{name}", title, caption, words, *drawn))
     return found
 
 

@@ -21,7 +21,14 @@ from conespot.results.light_exposure import light_exposures
 from conespot.results.makers import maker_block, read_makers
 from conespot.results.paper_values import CITATION
 from conespot.results.report.assumed import assumed
-from conespot.results.report.charts import figure_charts, numbers_of, path_charts, pictures, survey_charts
+from conespot.results.report.charts import (
+    figure_charts,
+    numbers_of,
+    path_charts,
+    pictures,
+    survey_charts,
+    theory_charts,
+)
 from conespot.results.report.gallery import LINES, gallery
 from conespot.results.report.summary import summary
 from conespot.results.report.theory import theory_tables
@@ -42,6 +49,7 @@ def make_report(run: Run, tables: Sequence[Table], drawings: Sequence[Drawing], 
     data = run.document.data
     crops = read_crops(run.folder)
     surveys = survey_charts(run)
+    theory = theory_tables(run.folder)
     first = [table for name in _PUBLISHED for table in tables if table.name == name]
     return fill(
         "page.html",
@@ -52,7 +60,8 @@ def make_report(run: Run, tables: Sequence[Table], drawings: Sequence[Drawing], 
         facts=_facts(run),
         published=first,
         others=[table for table in tables if table not in first],
-        theory=theory_tables(run.folder),
+        theory=theory,
+        bounds=theory_charts(run, theory),
         figures=figure_charts(drawings),
         numbers=numbers_of(drawings),
         pictures=[(drawing, _inlined(figures / f"{drawing.name}.png")) for drawing in pictures(drawings)],

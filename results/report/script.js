@@ -7,6 +7,7 @@
   const tools = [["toImage"], ["zoom2d", "pan2d"], ["zoomIn2d", "zoomOut2d", "resetScale2d"]];
   const toolsInSpace = [["toImage"], ["zoom3d", "pan3d", "tableRotation"], ["resetCameraDefault3d"]];
   const drawn = new Set();
+  let printing = false;
 
   // ---- light and dark
   let chosen = null; // by the reader; else the system's
@@ -52,21 +53,41 @@
     }
     return full;
   }
-  function arranged(layout, grid) {
+  function legendLines(data, width) { // about as many as the plotting library will need
+    const told = data.filter((trace) => trace.name && trace.showlegend !== false);
+    const wide = told.map((trace) => 7.4 * trace.name.length + 54);
+    const sum = wide.reduce((a, b) => a + b, 0);
+    if (sum <= width) return 1;
+    if (!told.some((trace) => trace.legendgroup)) return Math.ceil(wide.length / Math.max(1, Math.floor(width / Math.max(...wide))));
+    let lines = 1, used = 0;
+    for (const one of wide) { if (used && used + one > width) { lines += 1; used = 0; } used += one; }
+    return lines;
+  }
+  function arranged({ data, layout, grid, gap = 0.08 }, width) {
     if (layout.scene) return layout;
     const panels = grid.flat();
-    const stacked = narrow.matches && grid[0].length > 1;
+    const stacked = narrow.matches && !printing && grid[0].length > 1;
     const rows = stacked ? panels.map((panel) => [panel]) : grid;
-    const full = { ...layout, grid: { rows: rows.length, columns: rows[0].length, subplots: rows, roworder: "top to bottom", xgap: 0.08, ygap: 0.22 / Math.max(1, rows.length - 1) } };
+    const full = { ...layout, margin: { ...layout.margin }, grid: { rows: rows.length, columns: rows[0].length, subplots: rows, roworder: "top to bottom", xgap: gap, ygap: stacked ? 0.24 : 0.22 } };
     if (stacked) {
-      const tall = layout.height - 70;
-      full.height = 110 + (tall / grid.length) * panels.length * 0.86;
-      full.margin = { l: 52, r: 6, t: 110, b: 60 };
+      full.height = 134 + 320 * panels.length - 77;
+      full.margin = { l: 52, r: 6, t: 74, b: 60 };
       panels.forEach((_, i) => { // every panel is on its own below its neighbours
         const tail = i ? i + 1 : "", first = Math.floor(i / grid[0].length) * grid[0].length;
         full[`yaxis${tail}`] = { ...full[`yaxis${tail}`], title: full[`yaxis${first ? first + 1 : ""}`].title };
+        if (i < panels.length - 1) full[`xaxis${tail}`] = { ...full[`xaxis${tail}`], title: { text: "" } };
       });
     }
+    if (printing && grid.length > 1) { // two a page
+      full.height = 420;
+      full.margin.t = 62;
+      full.margin.b = 50;
+      full.grid.ygap = 0.4;
+    }
+    const high = data.some((trace) => trace.legendgroup) ? 29 : 20; // of a legend's line [px]
+    const more = high * (legendLines(data, width - full.margin.l - full.margin.r) - 1);
+    full.margin.t += more;
+    full.height += more;
     return full;
   }
   function canTurn() {
@@ -83,12 +104,12 @@
     const layout = { height: 420, margin: { l: 56, r: 10, t: 60, b: 48 }, hovermode: "closest", legend: chart.layout.legend,
       xaxis: { title: { text: "x [mm]" } }, yaxis: { title: { text: "y [mm], from above" }, scaleanchor: "x" },
       xaxis2: { title: { text: "x [mm]" } }, yaxis2: { title: { text: "z [mm], from the side" }, scaleanchor: "x2" } };
-    return { data, layout, grid: [["xy", "x2y2"]] };
+    return { data, layout, grid: [["xy", "x2y2"]], gap: 0.18 };
   }
   function draw(place) {
     let chart = JSON.parse(document.querySelector(`script[data-of="${place.dataset.chart}"]`).textContent);
-    if (chart.layout.scene && !canTurn()) chart = flat(chart);
-    const layout = themed(arranged(chart.layout, chart.grid));
+    if (chart.layout.scene && (printing || !canTurn())) chart = flat(chart); // nobody turns paper
+    const layout = themed(arranged(chart, place.clientWidth));
     place.style.height = `${layout.height}px`;
     const done = Plotly.react(place, coloured(chart.data), coloured(layout),
       { ...settings, modeBarButtons: layout.scene ? toolsInSpace : tools });
@@ -108,11 +129,18 @@
   places.forEach((place) => seen.observe(place));
   narrow.addEventListener("change", () => drawn.forEach((place) => draw(place)));
   addEventListener("beforeprint", () => {
+    printing = true;
+    root.dataset.printing = ""; // gives charts the width of a page
     dress(false);
     places.filter((place) => place.offsetParent).forEach((place) => draw(place));
     drawn.forEach((place) => Plotly.Plots.resize(place));
   });
-  addEventListener("afterprint", () => dress(dark()));
+  addEventListener("afterprint", () => {
+    printing = false;
+    delete root.dataset.printing;
+    dress(dark());
+    drawn.forEach((place) => Plotly.Plots.resize(place));
+  });
 
   // ---- one path of several
   document.getElementById("path-choice")?.addEventListener("change", (event) => {
