@@ -38,9 +38,8 @@ def beside_bounds(run: Run, theory: Sequence[Table]) -> tuple[list[Json], Json] 
     if not possible and not designed:
         return None
     labels = list(dict.fromkeys(label for label, _ in (*reached, *possible, *designed)))
-    layout = panels(
-        [[""]], "root mean square tip error [um]", [""], height=60 + sum(12 + 14 * len(_wrapped(x)) for x in labels)
-    )
+    high = max(len(_wrapped(label)) for label in labels)
+    layout = panels([[""]], "root mean square tip error [um]", [""], height=60 + len(labels) * (10 + 20 * high))
     layout["xaxis"] |= {"type": "log"}
     layout["yaxis"] |= {"range": [len(labels) - 0.4, -0.6], "automargin": True, "ticksuffix": "  ", "type": "category"}
     layout["yaxis"] |= {"tickfont": {"size": 11}}
