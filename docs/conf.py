@@ -28,6 +28,8 @@ html_theme = "furo"
 html_title = "conespot"
 html_show_copyright = False
 html_copy_source = False
+html_static_path = ["style"]
+html_css_files = ["tables.css"]
 
 
 def _write_reference(app: Sphinx) -> None:
