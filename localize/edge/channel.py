@@ -16,7 +16,7 @@ from conespot.localize.edge.nuisances import Nuisances, first_levels
 from conespot.localize.edge.settings import EDGE
 from conespot.localize.edge.strips import Strips, strip_scores
 from conespot.localize.model.noise import NoiseModel
-from conespot.localize.model.residual import RESIDUAL, follows, rest, rms
+from conespot.localize.model.residual import RESIDUAL, follows, incident_light, rest, rms
 from conespot.localize.model.solve import solved
 from conespot.localize.model.view import Shown
 
@@ -64,7 +64,7 @@ class Channel:
         The spotlights' light is `light` `[N]` with derivatives `rows` `[size, N]`.
         """
         g, shown, strips = math.exp(self._gain), self._shown, self.strips
-        incident = irradiance + g * light
+        incident = incident_light(irradiance, g * light)
         if not len(self._levels):
             self._level, self._levels = first_levels(shown, strips, incident, self._levels.shape[1])
         own = self._levels[strips.index]

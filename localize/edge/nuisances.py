@@ -11,7 +11,15 @@ from numpy.typing import NDArray
 from conespot.localize.edge.settings import EDGE
 from conespot.localize.edge.strips import Eliminated, Strips, strip_scores
 from conespot.localize.model.noise import NoiseModel
-from conespot.localize.model.residual import censored, follows, log_residuals, rest, rms, student_weights
+from conespot.localize.model.residual import (
+    censored,
+    follows,
+    incident_light,
+    log_residuals,
+    rest,
+    rms,
+    student_weights,
+)
 from conespot.localize.model.solve import inverse
 from conespot.localize.model.view import Shown
 
@@ -44,7 +52,7 @@ class Nuisances:
         Of light from under the retina `odds` `[N]` is its derivative by the logarithm of that one's.
         """
         g, shown = math.exp(self.gain), self.shown
-        incident = irradiance + g * light
+        incident = incident_light(irradiance, g * light)
         if odds is not None:
             self.strips = replace(self.strips, odds=g / incident * odds)
         brightness = np.exp(shown.template) * incident

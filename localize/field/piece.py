@@ -12,7 +12,7 @@ from conespot.localize.field.sandwich import albedo_scatter, rest_scatter
 from conespot.localize.field.settings import FIELD
 from conespot.localize.model.gain import gain_between
 from conespot.localize.model.noise import NoiseModel
-from conespot.localize.model.residual import log_residuals, rms
+from conespot.localize.model.residual import incident_light, log_residuals, rms
 from conespot.localize.model.view import Bins, Shown
 
 Array = NDArray[np.float64]
@@ -107,7 +107,7 @@ class Piece:
         shape, gain = plane.signal.shape, np.exp(log_gain)
         full = self._full(light)
         self._lit = full > 0.0
-        brightness = bins.ambient.reshape(shape) + gain * full
+        brightness = incident_light(bins.ambient.reshape(shape), gain * full)
         model = np.exp(plane.template + self._albedo) * brightness
         residual, bound = log_residuals(plane, model)
         use = self._usable | (bound & self._seen)
