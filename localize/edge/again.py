@@ -40,9 +40,9 @@ _POSE, _ALL = 5, 6  #: parameters of the pose, and with the blur
 class AgainSettings:
     """Numbers of the fit that follows; `benchmarks/tracking.py` shows what they do."""
 
-    #: steps at most, and how short the last must be [sigmas of uncorrelated residuals]: a step leaves a fifth of itself.
-    #: A new track knows no velocity, so that its next frames seek a blur as well: after five steps, which with six
-    #: in all was one too few and cost a whole fit
+    #: steps at most, and how short the last must be [sigmas of uncorrelated residuals]: a step leaves a fifth of itself
+    #: (a new track knows no velocity, so that its next frames seek a blur as well, after five steps: with six in all
+    #: that was one too few, and cost a whole fit)
     steps: int = 10
     enough: float = 2.0
     #: and before a blur is sought
