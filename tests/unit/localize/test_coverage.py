@@ -14,7 +14,7 @@ from conespot.localize.field.roughness import Roughness
 from conespot.localize.field.sandwich import rest_scatter
 from conespot.localize.model.forward import ambient_irradiance, light
 from conespot.localize.model.profile import Profile
-from conespot.localize.model.residual import RESIDUAL, censored, incident_light
+from conespot.localize.model.residual import censored, incident_light
 from conespot.localize.model.sight import look, window
 from conespot.localize.theory.bounds import patch_pixels
 from conespot.scene.beam import CyclesBeam, HardBeam
@@ -78,12 +78,12 @@ def test_clipped_bins_make_up_for_those_that_are_measured_because_noise_left_the
         assert np.all((worth >= 0.0) & (worth <= 1.0))
 
 
-def test_a_spread_that_is_sought_takes_off_no_more_than_the_light_there_is():
+def test_a_model_that_takes_off_more_light_than_there_is_has_none():
     ambient = np.array([1.0, 1.0, 0.97])
     spotlights = np.array([2.0, -0.5, -1.9])  # the last as a fit on a clipped soft patch had it
     light = incident_light(ambient, spotlights)
     np.testing.assert_array_equal(light[:2], (ambient + spotlights)[:2])
-    assert light[2] == RESIDUAL.darkest * ambient[2]
+    assert np.isnan(light[2])
 
 
 @lru_cache
