@@ -26,7 +26,7 @@ from conespot.scene.trajectory import AnyTrajectory, Box
 #: named in the file by a word alone, which stands for a mapping with this key
 _WORDS = {"scene": "preset", "trajectory": "kind"}
 #: keys whose value may be a file's name
-_FILES = ("file", "preset", "scene")
+_FILES = ("file", "preset", "scene", "calibration")
 _FRAMES = (*CASE, "bounds", "frames", "sweep")
 
 
