@@ -179,10 +179,11 @@ class Renderer:
     def _cone(self, pose: Pose, spotlight: int) -> NDArray[np.float64]:
         """The outline `[N, 3]` [mm] of a still point's cone, moved along the rays by what bumps may add or hide."""
         rays = self.scene.outline(pose, spotlight) - pose.apex
-        length = np.linalg.norm(rays, axis=-1, keepdims=True)
+        length, relief = np.linalg.norm(rays, axis=-1, keepdims=True), self.scene.surface.relief
         # three times the relief covers any incidence up to 70 deg
-        reach = np.concatenate([length + k * self.scene.surface.relief for k in (-3.0, 0.0, 3.0)])
-        return np.asarray(pose.apex + np.tile(rays / length, (3, 1)) * np.maximum(reach, 0.0))
+        around = (-3.0 * relief, 0.0, 3.0 * relief) if relief else (0.0,)
+        reach = np.concatenate([length + more for more in around])
+        return np.asarray(pose.apex + np.tile(rays / length, (len(around), 1)) * np.maximum(reach, 0.0))
 
     def background(self, pose: Pose | None = None) -> Image:
         """The radiance `[H, W, C]` [W m-2 sr-1] in ambient light alone. With a visible shaft it needs the pose."""
