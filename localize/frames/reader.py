@@ -9,7 +9,7 @@ from pathlib import Path
 
 from conespot.localize.frames.fit import fitted
 from conespot.localize.frames.recording import SUFFIX, read_recording
-from conespot.localize.frames.still import kind_of, read_still
+from conespot.localize.frames.still import kind_of, read_stills
 from conespot.localize.frames.video import SUFFIXES, read_video
 from conespot.localize.image import AnyImage
 from conespot.scene.document import InputError
@@ -22,7 +22,7 @@ STILLS = (".png", ".tif", ".tiff", ".jpg", ".jpeg", ".exr")
 
 @dataclass(frozen=True, eq=False)
 class GivenFrame:
-    """A frame from outside: its file's name (of a video with the number of the frame), and what `locate` takes.
+    """A frame from outside: its name (its file's, and of several in a file its number), and what `locate` takes.
 
     `image` is `[H, W]` or `[H, W, 3]` (RGB) in values of the scene's sensor, `time_s` its time stamp [s], None where
     the source has none.
@@ -36,14 +36,15 @@ class GivenFrame:
 def read_frames(sources: Sequence[Path], scene: Scene) -> Iterator[GivenFrame]:
     """The frames of images, folders of images (in the order of the numbers in their names) and videos, one by one.
 
+    Of a TIFF each page is a frame.
     Raises InputError where it gets to a source or a frame that is missing, broken or does not fit the scene; in words
     that name the key of the scene that would mend it.
     """
     for source in sources:
         path = at_home(source)
         if path.is_dir():
-            for inside in _stills(path):
-                yield _still(inside, scene)
+            for inside in _files(path):
+                yield from _stills(inside, scene)
         elif path.suffix.lower() in SUFFIXES and kind_of(path) is None:
             for number, (time, stored) in enumerate(read_video(path, scene)):
                 name = f"{path}, frame {number}"
@@ -53,18 +54,19 @@ def read_frames(sources: Sequence[Path], scene: Scene) -> Iterator[GivenFrame]:
                 name = f"{path}, frame {number}"
                 yield GivenFrame(name, time, fitted(name, stored, scene))
         else:
-            yield _still(path, scene)
+            yield from _stills(path, scene)
 
 
-def _still(path: Path, scene: Scene) -> GivenFrame:
+def _stills(path: Path, scene: Scene) -> Iterator[GivenFrame]:
     kind = kind_of(path)
     if kind is None:
         known = f"PNG, TIFF, JPEG and EXR; videos end in {', '.join(SUFFIXES)}"
         raise InputError(f"{path}: begins like none of the images that are read: {known}")
-    return GivenFrame(str(path), None, fitted(str(path), read_still(path, kind, scene), scene))
+    for name, stored in read_stills(path, kind, scene):
+        yield GivenFrame(name, None, fitted(name, stored, scene))
 
 
-def _stills(folder: Path) -> list[Path]:
+def _files(folder: Path) -> list[Path]:
     try:
         found = [path for path in folder.iterdir() if path.suffix.lower() in STILLS and not path.name.startswith(".")]
     except OSError as error:

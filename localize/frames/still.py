@@ -1,12 +1,13 @@
-"""One picture from a file: PNG, TIFF, JPEG or EXR, known by its first bytes, of 8 to 16 bits or float.
+"""Pictures from a file: PNG, TIFF, JPEG or EXR, known by its first bytes, of 8 to 16 bits or float.
 
-Pillow reads headers and JPEG, OpenCV unpacks PNG and TIFF with all their bits, OpenEXR reads EXR.
+Pillow reads the headers of PNG and JPEG, and JPEG, OpenCV unpacks PNG and TIFF with all their bits, OpenEXR reads EXR.
 """
 
 from __future__ import annotations
 
 import io
 import warnings
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -14,6 +15,7 @@ import cv2
 import numpy as np
 
 from conespot.localize.frames.stored import Pixels, Stored, Transfer, Turn, check_size
+from conespot.localize.frames.tiff import Page, pages_of, turn_to
 from conespot.scene.document import InputError
 from conespot.scene.exr import read_exr
 from conespot.scene.hushed import hushed
@@ -32,6 +34,8 @@ MAGIC = {
 }
 #: bytes of a file a pixel of the frame, and beside: four floats, twice, and room for what cameras write into headers
 _MOST_BYTES, _BESIDE_BYTES = 32, 8_000_000
+#: bytes of a TIFF of several pages: it is held in memory, twice for a moment
+_MOST_STACK_BYTES = 400_000_000
 _ORIENTATION = 274
 _TIFF_KINDS = {0: "white is zero", 3: "a palette", 4: "a mask", 5: "CMYK", 6: "YCbCr", 8: "CIELAB"}
 
@@ -51,26 +55,44 @@ def kind_of(path: Path) -> str | None:
     return next((kind for magic, kind in MAGIC.items() if first.startswith(magic)), None)
 
 
-def read_still(path: Path, kind: str, scene: Scene) -> Stored:
-    """The picture in a file of a `kind`. Raises InputError for one that is broken, or not of the camera's size."""
+def read_stills(path: Path, kind: str, scene: Scene) -> Iterator[tuple[str, Stored]]:
+    """The pictures in a file of a `kind` with their names: one, or of a TIFF as many as it has pages.
+
+    Raises InputError for a file that is broken, and for a picture that is not of the camera's size: of all pages before
+    the first is unpacked.
+    """
     name = str(path)
-    if kind == "EXR":
-        return _exr(path, scene)
-    if kind == "BigTIFF":
-        raise InputError(f"{name}: is a BigTIFF; save the frame as a TIFF below 4 GB, or as PNG")
+    match kind:
+        case "EXR":
+            yield name, _exr(path, scene)
+        case "BigTIFF":
+            raise InputError(f"{name}: is a BigTIFF; save the frames as TIFFs below 400 MB, or as PNG")
+        case "TIFF":
+            yield from _stack(name, bytearray(_raw(path, _MOST_STACK_BYTES, scene)), scene)
+        case _:
+            yield name, _picture(name, kind, _raw(path, 0, scene), scene)
+
+
+def _raw(path: Path, least: int, scene: Scene) -> bytes:
+    """A file's bytes, of which a frame has a limit that is at `least` so many."""
     rows, columns = scene.camera.shape
     try:
-        raw = read_bytes(path, rows * columns * _MOST_BYTES + _BESIDE_BYTES, f"frame of {columns} x {rows} px")
+        return read_bytes(path, max(least, _most(1, scene)), f"frame of {columns} x {rows} px")
     except ValueError as error:
         raise InputError(str(error)) from None
-    return _picture(name, kind, raw, scene)
+
+
+def _most(frames: int, scene: Scene) -> int:
+    """Bytes of a file of so many frames."""
+    rows, columns = scene.camera.shape
+    return frames * rows * columns * _MOST_BYTES + _BESIDE_BYTES
 
 
 def still_of(name: str, raw: bytes, scene: Scene) -> Stored:
-    """The picture in the bytes of a PNG, JPEG or TIFF called `name`. Raises InputError as `read_still` does."""
+    """The picture in the bytes of a PNG, JPEG or TIFF called `name`. Raises InputError as `read_stills` does."""
     kind = next((kind for magic, kind in MAGIC.items() if raw.startswith(magic)), None)
     rows, columns = scene.camera.shape
-    if kind not in ("PNG", "JPEG", "TIFF") or len(raw) > rows * columns * _MOST_BYTES + _BESIDE_BYTES:
+    if kind not in ("PNG", "JPEG", "TIFF") or len(raw) > _most(1, scene):
         raise InputError(f"{name}: is no PNG, JPEG or TIFF of a frame of {columns} x {rows} px")
     return _picture(name, kind, raw, scene)
 
@@ -84,7 +106,10 @@ def _picture(name: str, kind: str, raw: bytes, scene: Scene) -> Stored:
             case "JPEG":
                 return _jpeg(name, raw, scene)
             case _:
-                return _tiff(name, raw, scene)
+                pages = _pages(name, raw, scene)
+                if len(pages) > 1:
+                    raise InputError(f"{name}: holds several pages, where one frame is due")
+                return _page(name, raw)
 
 
 def _png(name: str, raw: bytes, scene: Scene) -> Stored:
@@ -124,34 +149,41 @@ def _jpeg(name: str, raw: bytes, scene: Scene) -> Stored:
     return Stored(pixels, turn, _transfer(picture.info))
 
 
-def _tiff(name: str, raw: bytes, scene: Scene) -> Stored:
-    from PIL.TiffImagePlugin import ImageFileDirectory_v2
+def _stack(name: str, raw: bytearray, scene: Scene) -> Iterator[tuple[str, Stored]]:
+    """The pages of a TIFF, one unpacked at a time."""
+    pages = _pages(name, raw, scene)
+    if len(raw) > _most(len(pages), scene):
+        said = "a frame" if len(pages) == 1 else f"{len(pages)} frames"
+        raise InputError(f"{name}: larger than {said} of {scene.camera.size_words} can be")
+    for number, page in enumerate(pages):
+        turn_to(raw, page)
+        own = name if len(pages) == 1 else f"{name}, frame {number}"
+        yield own, _page(own, raw)
 
-    stream = io.BytesIO(raw)
-    try:
-        tags = ImageFileDirectory_v2(stream.read(8))
-        stream.seek(tags.next)
-        tags.load(stream)
-        width, height = int(tags[256]), int(tags[257])
-        bits = {int(value) for value in _listed(tags.get(258, 1))}
-        kind, turned = int(tags.get(262, 1)), int(tags.get(_ORIENTATION, 1))
-        several = bool(tags.next)
-    except Exception as error:
-        raise _broken(name, "TIFF", error) from None
-    if several:
-        raise InputError(f"{name}: holds several pages; save one frame a file")
-    if kind in _TIFF_KINDS:
-        raise InputError(f"{name}: is a TIFF of {_TIFF_KINDS[kind]}; save it in grey or RGB, black as zero")
-    if not bits <= {8, 16, 32, 64}:
-        words = ", ".join(map(str, sorted(bits)))
-        raise InputError(f"{name}: has {words} bits a value in its TIFF; save it with 8 or 16, or as 32-bit float")
-    turn = Turn.exif(turned)
-    check_size(name, height, width, (turn, Turn.stated(scene.storage)), scene)
-    # OpenCV turns a TIFF upright by itself
+
+def _page(name: str, raw: bytes | bytearray) -> Stored:
+    # OpenCV takes the first page, and turns it upright by itself
     return Stored(_unpacked(name, "TIFF", raw))
 
 
-def _unpacked(name: str, kind: str, raw: bytes) -> Pixels:
+def _pages(name: str, raw: bytes | bytearray, scene: Scene) -> list[Page]:
+    try:
+        pages = pages_of(raw)
+    except ValueError as error:
+        raise _broken(name, "TIFF", error) from None
+    for number, page in enumerate(pages):
+        own = name if len(pages) == 1 else f"{name}, frame {number}"
+        if page.kind in _TIFF_KINDS:
+            raise InputError(f"{own}: is a TIFF of {_TIFF_KINDS[page.kind]}; save it in grey or RGB, black as zero")
+        if not page.bits <= {8, 16, 32, 64}:
+            words = ", ".join(map(str, sorted(page.bits)))
+            raise InputError(f"{own}: has {words} bits a value in its TIFF; save it with 8 or 16, or as 32-bit float")
+        turns = (Turn.exif(page.orientation), Turn.stated(scene.storage))
+        check_size(own, page.height, page.width, turns, scene)
+    return pages
+
+
+def _unpacked(name: str, kind: str, raw: bytes | bytearray) -> Pixels:
     try:
         with hushed():  # libpng and libtiff would complain on stderr too
             found = cv2.imdecode(np.frombuffer(raw, np.uint8), cv2.IMREAD_UNCHANGED)
@@ -192,10 +224,6 @@ def _transfer(info: dict[Any, Any]) -> Transfer | None:
         return None
     known: tuple[tuple[float, Transfer], ...] = ((1.0 / 2.2, "srgb"), (1.0, "linear"))
     return next((said for gamma, said in known if abs(float(info["gamma"]) - gamma) < 0.01), "other")
-
-
-def _listed(value: Any) -> tuple[Any, ...]:
-    return value if isinstance(value, tuple) else (value,)
 
 
 def _broken(name: str, kind: str, error: BaseException | None) -> InputError:

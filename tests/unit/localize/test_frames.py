@@ -188,6 +188,66 @@ def test_a_folder_is_read_in_the_order_of_its_numbers_and_the_rest_of_it_left(tm
     assert names == ["9.png", "10.png", "100.png"]
 
 
+def write_stack(path, pages):
+    assert cv2.imwritemulti(str(path), pages)
+    return path
+
+
+def test_the_pages_of_a_12_bit_tiff_are_frames_to_the_bit(tmp_path):
+    path = write_stack(tmp_path / "x.tif", [VALUES, VALUES[::-1], VALUES // 2 + 1])
+    found = list(read_frames([path], scene(**LINEAR)))
+    assert [frame.name for frame in found] == [f"{path}, frame {number}" for number in range(3)]
+    for frame, page in zip(found, [VALUES, VALUES[::-1], VALUES // 2 + 1], strict=True):
+        assert frame.image.dtype == np.uint16
+        assert np.array_equal(frame.image, page)
+
+
+def test_a_page_of_another_size_is_named_before_any_is_read(tmp_path):
+    path = write_stack(tmp_path / "x.tif", [VALUES, VALUES[:15, :20]])
+    with pytest.raises(InputError, match=r"x.tif, frame 1: 20 x 15 px do not fit"):
+        read(path, **LINEAR)
+
+
+def directories(data):
+    """Where the directories of a little-endian TIFF begin, and where each says what the next one is."""
+    (at,) = struct.unpack_from("<I", data, 4)
+    while at:
+        says = at + 2 + 12 * struct.unpack_from("<H", data, at)[0]
+        yield at, says
+        (at,) = struct.unpack_from("<I", data, says)
+
+
+def test_pages_that_lead_in_a_circle_or_out_of_the_file_are_refused(tmp_path):
+    path = write_stack(tmp_path / "x.tif", [VALUES, VALUES])
+    data = path.read_bytes()
+    assert data[:2] == b"II"
+    (first, _), (second, says) = directories(data)
+    for leads, said in {
+        first: "leads back",
+        second: "leads back",
+        len(data): "end early",
+        0xFFFFFFFF: "end early",
+    }.items():
+        path.write_bytes(data[:says] + struct.pack("<I", leads) + data[says + 4 :])
+        with pytest.raises(InputError, match=f"x.tif: cannot be read as TIFF: .*{said}"):
+            read(path, **LINEAR)
+
+
+def test_a_tiff_without_end_and_one_that_holds_more_than_its_pages_are_refused(tmp_path):
+    path = write_stack(tmp_path / "x.tif", [VALUES])
+    data = path.read_bytes()
+    ((_, says),) = directories(data)
+    path.write_bytes(data + bytes(9_000_000))
+    with pytest.raises(InputError, match="x.tif: larger than a frame of 40 x 30 px can be"):
+        read(path, **LINEAR)
+    entries = b"".join(struct.pack("<HHII", tag, 4, 1, value) for tag, value in ((256, 40), (257, 30), (258, 16)))
+    size = 2 + len(entries) + 4
+    pages = [struct.pack("<H", 3) + entries + struct.pack("<I", len(data) + (k + 1) * size) for k in range(10_001)]
+    path.write_bytes(data[:says] + struct.pack("<I", len(data)) + data[says + 4 :] + b"".join(pages))
+    with pytest.raises(InputError, match="more than 10000 pages"):
+        read(path, **LINEAR)
+
+
 def test_what_begins_like_no_image_and_what_is_no_file_are_one_sentence(tmp_path):
     (tmp_path / "x.png").write_text("hello")
     (tmp_path / "x.mkv").write_text("hello")
