@@ -165,7 +165,7 @@ class Surface(Model):
     def _radius(self, eye: Eye, d: Array) -> tuple[Array, Array]:
         """Distance from the eye's centre `[N]` [mm] in unit directions `[N, 3]`, and its gradient there `[N, 3]`."""
         radius, gradient = self._wall(eye, d)
-        for bump, axis in zip(self.bumps, self._axes(eye), strict=True):
+        for bump, axis in zip(self.bumps, self._axes(eye) if self.bumps else (), strict=True):
             widest = math.cos(min(bump.reach / eye.radius, math.pi))
             near = np.flatnonzero(d @ axis > widest)
             if not len(near):  # a tip's wall is near few of them, and asked for a few points at a time

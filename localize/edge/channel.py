@@ -47,16 +47,13 @@ class Channel:
         """Each bin has so many `pixels`."""
         self._shown, self.strips, self._noise, self._pixels, self._size = shown, strips, noise, pixels, size
         self.kept, self._spread, self._white, self._gain = was, was.spread, was.white, was.gain
-        self._slow_basis = strips.slow
-        self._slow = np.zeros(len(self._slow_basis))
+        self._slow = np.zeros(len(strips.waves))
         self._levels = np.zeros((0, 2))
         self._level = 0.0
         own = [1e-9, 1e-9, *len(self._slow) * [was.slow_spread**-2]]
         self._precision = np.array(own)
-        self._rows = np.empty((size + len(own), len(shown.signal)))
-        self._rows[size + 1] = 1.0
-        self._rows[size + 2 :] = self._slow_basis
-        self._steady: NDArray[np.bool_] | None = None
+        self._rows = np.empty((size + 1, len(shown.signal)))  # of the shared and the gain
+        self._steady: NDArray[np.intp] | None = None
 
     def equations(self, irradiance: Array, light: Array, rows: Array) -> tuple[Array, Array]:
         """Information `[size, size]` and gradient `[size]`, all of the channel's own eliminated.
@@ -67,9 +64,9 @@ class Channel:
         incident = incident_light(irradiance, g * light)
         if not len(self._levels):
             self._level, self._levels = first_levels(shown, strips, incident, self._levels.shape[1])
-        own = self._levels[strips.index]
-        albedo = own[:, 0] + own[:, 1] * strips.offset
-        model = np.exp(self._level + self._slow @ self._slow_basis + albedo) * incident
+        albedo, slow = self._albedo(self._levels[:, 1]), self._slow @ strips.waves
+        albedo += self._levels[strips.index, 0]
+        model = np.exp(self._level + self._albedo(slow) + albedo) * incident
         residual = shown.signal / model - 1.0
         wide = np.abs(residual) >= RESIDUAL.linear
         if wide.any():
@@ -85,32 +82,45 @@ class Channel:
         self._whitened, self._residual, self._weights = residual / np.sqrt(variance), residual, weights
         return self._eliminated(residual + albedo)
 
+    def _albedo(self, slopes: Array) -> Array:
+        """What slopes of the strips `[S]` do to the log light of each bin `[N]`."""
+        return np.asarray(slopes[self.strips.index] * self.strips.offset)
+
     def _scatter(self, residual: Array, variance: Array, pull: Array) -> None:
         """What residuals scatter beyond the sensor's noise, from the bins that hold the edge."""
         if self._steady is None:
             steep = np.abs(pull)
             at = len(steep) - 1 - len(steep) // _STEEPEST
-            self._steady = self._shown.usable & (steep > EDGE.steady * np.partition(steep, at)[at])
+            steady = self._shown.usable & (steep > EDGE.steady * np.partition(steep, at)[at])
+            self._steady = np.flatnonzero(steady)
         if np.count_nonzero(self._steady) > EDGE.fewest_bins:
             self._white = rest(residual[self._steady], variance[self._steady], self._white)
 
     def _eliminated(self, data: Array) -> tuple[Array, Array]:
-        size, strips, count = self._size, self.strips, len(self._rows)
-        columns = np.empty((2 * count + 5, len(data)))
-        weighted = columns[: count + 1]
-        np.multiply(self._rows, self._weights, out=weighted[:count])
-        np.multiply(data, self._weights, out=weighted[count])
-        np.multiply(weighted, strips.offset, out=columns[count + 1 : 2 * count + 2])
+        size, strips, many = self._size, self.strips, len(self._rows)
+        columns = np.empty((2 * many + 5, len(data)))
+        weighted = columns[: many + 1]
+        np.multiply(self._rows, self._weights, out=weighted[:many])
+        np.multiply(data, self._weights, out=weighted[many])
+        np.multiply(weighted, strips.offset, out=columns[many + 1 : -3])
         columns[-3] = self._weights
         np.multiply(self._weights, strips.offset, out=columns[-2])
         np.multiply(columns[-2], strips.offset, out=columns[-1])
         sums = strips.sums(columns)
-        a, b, d = sums[-3] + self._spread[0] ** -2, sums[-2], sums[-1] + self._spread[1] ** -2
+        # what is the same all over a strip, the level and the slow slopes, needs no sums of its own
+        waves, (ones, once, twice) = strips.waves, sums[-3:]
+        flat = np.concatenate([sums[:many], ones[None], waves * once, sums[many : many + 1]])
+        sloped = np.concatenate([sums[many + 1 : -4], once[None], waves * twice, sums[-4:-3]])
+        count = len(flat) - 1
+        normal = np.empty((count + 1, count))
+        normal[:, many] = flat.sum(axis=1)
+        normal[:, many + 1 :] = sloped @ waves.T
+        normal[many:count, :many] = normal[:many, many:].T
+        normal[[*range(many), count], :many] = weighted @ self._rows.T
+        a, b, d = ones + self._spread[0] ** -2, once, twice + self._spread[1] ** -2
         det = a * d - b * b
-        flat, sloped = sums[: count + 1], sums[count + 1 : 2 * count + 2]
         self._solved = (d * flat - b * sloped) / det, (a * sloped - b * flat) / det
         self._variance = float(np.mean(d / det)), float(np.mean(a / det))
-        normal = weighted @ self._rows.T
         normal -= flat @ self._solved[0][:count].T + sloped @ self._solved[1][:count].T
         self._information, self._gradient = normal[:count], normal[count]
         own = np.arange(size, count)
@@ -161,7 +171,9 @@ class Channel:
 
         And the covariance `[size, size]` of what the channel's own priors add to the gradient.
         """
-        rows = np.concatenate([self._rows[:size], self._rows[self._size :]])
+        rows = np.concatenate(
+            [self._rows[:size], self._rows[self._size :], np.ones((1, len(self._weights))), self.strips.slow]
+        )
         gradient, own = strip_scores(
             self.strips, rows, self._residual, self._weights, self._levels, np.asarray(self._spread)
         )

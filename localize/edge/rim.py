@@ -54,7 +54,7 @@ class Rim:
         count = max(8, int(perimeter / WIDTH))
         turn = (np.arctan2(row - middle[1], column - middle[0]) + math.pi) * (count / (2.0 * math.pi))
         strip = np.minimum(turn.astype(np.intp), count - 1)
-        order = np.argsort(strip, kind="stable")
+        order = np.argsort(strip.astype(np.uint16), kind="stable")  # of so few bits it is a radix sort
         row, column, strip = row[order], column[order], strip[order]
         new = np.append(True, strip[1:] != strip[:-1])
         window = Window(int(low[1]) * side, int(low[0]) * side, mask.shape[0], mask.shape[1], side)

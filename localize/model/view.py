@@ -163,7 +163,8 @@ class Shown:
 
     def at(self, row: NDArray[np.intp], column: NDArray[np.intp]) -> Shown:
         """The same in some of the bins `[N]`."""
-        return Shown(*(plane[row, column] for plane in vars(self).values()))
+        at = row * self.signal.shape[1] + column
+        return Shown(*(plane.ravel()[at] for plane in vars(self).values()))
 
 
 def log_albedo(reference: Reference, scene: Scene, at: Window, noise: NoiseModel) -> tuple[Array, Array]:
