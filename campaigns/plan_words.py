@@ -49,6 +49,7 @@ class Size:
     pixel: float = (
         9.0  #: of a frame, in each process that renders, beside 0.25 GB: more than that from 7000 px a side on
     )
+    glowing_pixel: float = 34.0  #: more where light spreads under the retina: what is kept of t for the next tiles
     row: float = 1.2e3  #: in journal, CSV and parquet together
     report: float = 5e6
 
@@ -86,10 +87,15 @@ def _effects(plan: Plan) -> Iterator[str]:
 
 def _memory(plan: Plan, workers: int) -> float:
     """Memory [bytes] of the processes of a run."""
-    spectral = any(case.scene.retina.is_spectral for case in plan.cases)
-    most = max(math.prod(case.scene.camera.shape) for case in plan.cases)
-    worker = max(SIZE.spectral_worker if spectral else SIZE.worker, 0.25e9 + SIZE.pixel * most)
-    return SIZE.session + workers * worker
+    return SIZE.session + workers * max(_worker(case.scene) for case in plan.cases)
+
+
+def _worker(scene: Scene) -> float:
+    """Memory [bytes] of a process that renders and localizes frames of a scene."""
+    pixels = math.prod(scene.camera.shape)
+    least = SIZE.spectral_worker if scene.retina.is_spectral else SIZE.worker
+    glowing = SIZE.glowing_pixel * pixels if scene.spread is not None else 0.0
+    return max(least, 0.25e9 + SIZE.pixel * pixels) + glowing
 
 
 def _disk(plan: Plan) -> float:

@@ -185,6 +185,15 @@ def test_memory_grows_with_workers_and_disk_with_frames_that_are_kept(plan):
     assert list(describe(plan(large), 2))[-1].startswith("about 2.7 GB of memory")
 
 
+def test_memory_grows_with_the_frame_where_light_spreads_under_the_retina(plan):
+    """One worker of a living fundus without and with spread, beside what was measured in docs/performance.md."""
+    text = "scene: {{preset: theatre-ideal, camera: {{resolution: [{}]}}, retina: {{kind: fundus{}}}}}\nposes: 1\n"
+    spread = ", spread: {scattering: 1}"
+    cases = (("1920, 1080", ""), ("3840, 2160", ""), ("1920, 1080", spread), ("3840, 2160", spread))
+    found = [list(describe(plan(text.format(size, how)), 1))[-1].split(" GB")[0] for size, how in cases]
+    assert found == ["about 1.6", "about 1.6", "about 1.7", "about 1.9"]
+
+
 def test_edge_samples_are_rendered_apart_and_are_counted_as_work_where_the_beam_is_hard(plan):
     """Groups and the stated time with 0 and 65,536 samples on the edge, of a hard and of a soft beam."""
     text = "scene: paper\nposes: 4\nedge_samples: {}\nsweep: {{scene.beam: [{{kind: {}}}]}}\n"
