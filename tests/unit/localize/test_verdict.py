@@ -16,9 +16,11 @@ from conespot.localize.verdict import (
     OUTSIDE,
     UNSETTLED,
     VERDICT,
+    WRONG_BEAM,
     judged,
 )
 from conespot.scene import Pose
+from conespot.scene.beam import HardBeam
 from conespot.scene.scene import Scene
 from conespot.scene.spotlights import RIGS
 
@@ -55,6 +57,16 @@ def test_quantities_beside_the_pose_are_in_the_covariance_and_left_out_of_it():
     found = judged(Estimate(scene.pose(TIP), scene), inverse(information), scene, knowns, **FINE)
     assert found.covariance.shape == (5, 5)
     assert math.sqrt(found.covariance[2, 2]) == pytest.approx(SIGMAS[2] / 0.8, rel=1e-3)
+
+
+@pytest.mark.parametrize(("core", "answered"), [(0.2, True), (0.33, False)])
+def test_a_core_far_wider_than_fibres_have_is_an_optic_disc_and_no_patch(core, answered):
+    scene, knowns = Scene(beam=HardBeam()), Knowns(0.01).doubting_core
+    wider = scene.model_copy(update={"beam": HardBeam(source_diameter=core)})
+    found = judged(Estimate(scene.pose(TIP), wider), np.diag(np.square(SIGMAS)), scene, knowns, **FINE)
+    assert isinstance(found, Localization) if answered else found.reason == WRONG_BEAM
+    told = judged(Estimate(scene.pose(TIP), wider), np.diag(np.square(SIGMAS)), wider, knowns, **FINE)
+    assert isinstance(told, Localization)
 
 
 def test_a_rig_has_its_roll_and_its_error():
