@@ -26,8 +26,6 @@ from conespot.scene import Pose, Scene
 
 LENS = "{numerical_aperture: 0.045, focus: 0 mm, blur: 5.7 um, glare: 0.02}"
 OPTICS = "{eye: navarro, lens: phakic, contact: flat, pupil: 8 mm}"
-LIGHTS = """{infrared: {scene.illumination: ir850}, green: {scene.illumination: {kind: flat, name: green, low: 530 nm,
-high: 560 nm}}, white: {scene.illumination: led-b3}}"""
 #: as `theatre` has them
 EFFECTS = {
     "ideal": "{}",
@@ -72,8 +70,8 @@ def reference(scene: Scene, pose: Pose) -> NDArray[np.float64]:
 
 def whole(tile: Tile, scene: Scene) -> NDArray[np.float64]:
     """A frame with nothing but the tile in it."""
-    frame, crop = np.zeros(scene.camera.shape), tile.crop
-    frame[crop.row : crop.row + crop.height, crop.column : crop.column + crop.width] = tile.radiance[..., 0]
+    frame = np.zeros(scene.camera.shape)
+    frame[tile.crop.slices] = tile.radiance[..., 0]
     return frame
 
 
@@ -93,10 +91,8 @@ def noise(scene: Scene, pose: Pose, frames: list[NDArray[np.float64]]) -> NDArra
 def main() -> int:
     """Print the table."""
     kernel.use_threads(1)
-    document = read_campaign("reality")
     effects = ", ".join(f"{name}: {settings}" for name, settings in EFFECTS.items())
-    for key, value in {"sweep.light": LIGHTS, "sweep.effect": f"{{{effects}}}"}.items():
-        document = override(document, key, value, "here")
+    document = override(read_campaign("reality"), "sweep.effect", f"{{{effects}}}", "here")
     kept = True
     ideal: dict[str, tuple[float, NDArray[np.float64]]] = {}
     print("light     effect    first s   later s   noise inside, rim %   time at equal noise: inside, rim")

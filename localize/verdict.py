@@ -39,8 +39,8 @@ class VerdictSettings:
     #: largest score over its sigma of a quantity that was told. On ten right scenes with hard edges the largest is 1.3,
     #: on eight with soft ones under `cone` 4.3; beams told a tenth softer have 11
     suspicious: float = 6.0
-    #: by how many of its sigmas a core may be wider than the scene says, in squared diameters. Eleven frames of 10,032
-    #: found one that nobody told of: an optic disc in place of a hard patch beyond the frame, 0.33 mm and 2.6 mm off
+    #: by how many of its sigmas a core may be wider than the scene says, in squared diameters. Eleven frames of 9,883
+    #: found one that nobody told of, of 0.32 to 0.33 mm: an optic disc for a hard patch beyond the frame, 2.6 mm off
     core_sigmas: float = 6.0
     #: largest rms residual over the model's, single ones counted to 5 at most
     largest_misfit: float = 2.5

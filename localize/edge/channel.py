@@ -93,7 +93,7 @@ class Channel:
             at = len(steep) - 1 - len(steep) // _STEEPEST
             steady = self._shown.usable & (steep > EDGE.steady * np.partition(steep, at)[at])
             self._steady = np.flatnonzero(steady)
-        if np.count_nonzero(self._steady) > EDGE.fewest_bins:
+        if len(self._steady) > EDGE.fewest_bins:
             self._white = rest(residual[self._steady], variance[self._steady], self._white)
 
     def _eliminated(self, data: Array) -> tuple[Array, Array]:

@@ -16,7 +16,6 @@ from conespot.scene.document import InputError
 from conespot.scene.lens import Lens
 from conespot.scene.motion import Tremor
 from conespot.scene.point_spread import WIDEST, GaussianSpread
-from conespot.scene.retina import Fundus, Spread
 from conespot.scene.scene import Scene
 
 #: a softness below is a hard edge to every camera
@@ -69,12 +68,8 @@ def _semi_axis(name: str, along: int) -> Quantity:
     return Quantity(name, read, write, changes="sight", step=1e-3, known="semi_axes_sigma_mm", unit="mm")
 
 
-def _spread(scene: Scene) -> Spread | None:
-    return scene.retina.spread if isinstance(scene.retina, Fundus) else None
-
-
 def _with_spread(scene: Scene, **values: float) -> Scene:
-    spread = _spread(scene)
+    spread = scene.spread
     assert spread is not None
     new = scene.retina.model_copy(update={"spread": spread.model_copy(update=values)})
     return scene.model_copy(update={"retina": new})
@@ -192,7 +187,7 @@ QUANTITIES = (
     # both as logarithms: a factor is as likely as its inverse
     Quantity(
         name="deep_amount",
-        read=lambda scene: _log(getattr(_spread(scene), "amount", None)),
+        read=lambda scene: _log(getattr(scene.spread, "amount", None)),
         write=lambda scene, new: _with_spread(scene, amount=math.exp(new)),
         changes="glow",
         step=1e-3,
@@ -201,7 +196,7 @@ QUANTITIES = (
     ),
     Quantity(
         name="deep_length",
-        read=lambda scene: _log(getattr(_spread(scene), "length", None)),
+        read=lambda scene: _log(getattr(scene.spread, "length", None)),
         write=lambda scene, new: _with_spread(scene, length=math.exp(new)),
         changes="glow",
         step=1e-3,

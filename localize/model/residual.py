@@ -22,7 +22,7 @@ class ResidualSettings:
     #: here 2 costs 10 % on clipped rims and refuses one more of 12, 8 gains 2 %
     student: float = 4.0
     #: share of the model's light below which a bin counts as that dark, so that its logarithm is finite: halved or
-    #: doubled, no error changes in its third digit.
+    #: doubled, no error changes in its third digit
     darkest: float = 0.02
     #: share of the model's light by which a bin may miss it to be taken to first order. On soft patches 0.15, 0.3 and
     #: 0.6 change no error by more than 4 %, on edges 0.25 and 1 by 3 %
