@@ -83,10 +83,11 @@ def list(options: argparse.Namespace) -> Ending:
 
 
 def show(options: argparse.Namespace) -> Ending:
-    """Print a campaign's file."""
-    from conespot.scene.document import find_document, read_document
+    """Print the file of a campaign, or of a scene preset."""
+    from conespot.scene.document import find_document, read_document, shipped
 
-    path = find_document(options.campaign, "campaigns", "", "campaign")
+    preset = shipped("scene", "presets").get(options.campaign)
+    path = preset or find_document(options.campaign, "campaigns", "", "campaign")
     read_document(path)  # no control characters reach a terminal
     streams.write(path.read_text("utf-8-sig"))
     return Ending.DONE

@@ -31,7 +31,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
         code: Ending = options.run(options)
         return code
     except InputError as error:
-        return _complain(error, Ending.BAD_INPUT)
+        from conespot.campaigns.mistaken import mistaken
+
+        return _complain(InputError(mistaken(options) or str(error)), Ending.BAD_INPUT)
     except KeyboardInterrupt:
         return _complain("interrupted", Ending.INTERRUPTED)
     except streams.UnheardError as error:

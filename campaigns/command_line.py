@@ -92,7 +92,8 @@ def _add_campaigns(add: _Add) -> None:
     schema.add_argument("--scene", action="store_true", help="that of a scene's file, such as a preset, in its place")
     completed = add(authoring.completion, "print what lets a shell complete this command's commands and options")
     completed.add_argument("shell", choices=("bash", "zsh"), metavar="SHELL", help="bash or zsh")
-    add(authoring.show, "print a campaign's file").add_argument("campaign")
+    show = add(authoring.show, "print the file of a campaign, or of a scene preset")
+    show.add_argument("campaign", help="its name, or a file")
 
 
 def _count(text: str) -> int:
