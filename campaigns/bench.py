@@ -62,7 +62,8 @@ class Bench:
     ) -> Iterator[tuple[Case, AnyImage, Reference | None]]:
         """Of every case of a unit, what its localizers are given: the image, gone when the next case comes, and unlit.
 
-        The pose is rendered once, and exposed at every power; with `only`, at those of the cases of these keys.
+        The pose is rendered once, and exposed at every power; with `only`, at those of the cases of these keys, and no
+        frame is kept.
         """
         group = self._plan.groups[unit.group]
         pose = group.pose(unit.pose)
@@ -75,7 +76,7 @@ class Bench:
             with exposure.shown(tiles, power, frame_seed(unit, cases[0])) as image:
                 for case in cases:
                     yield case, image, self._unlit(unit, case, exposure, tiles)
-                if self._frames is not None:
+                if self._frames is not None and only is None:
                     radiance = background.copy()
                     for tile in tiles:
                         radiance[tile.crop.slices] += np.float32(power) * tile.radiance

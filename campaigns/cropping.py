@@ -1,24 +1,21 @@
 """Crops of a finished run: the worst frames of its boxes once more, in the run's own settings and seeds.
 
-They are drawn after the run and not by its workers, so that no row waits for a picture and any run can get them later.
+They are drawn after the run, so that no row waits for a picture, by its workers, which have all that it takes at hand;
+and any run can get them later.
 """
 
 from __future__ import annotations
 
-import functools
 import sys
-import tempfile
 from pathlib import Path
 
 import pandas as pd
-from pydantic import TypeAdapter
 
-from conespot.campaigns.plan import Plan, Unit, make_plan
-from conespot.campaigns.pool import LocalPool
-from conespot.campaigns.row import Record
+from conespot.campaigns.cropper import Cropped, ToCrop
+from conespot.campaigns.executor import Executor
+from conespot.campaigns.plan import Plan, make_plan
 from conespot.campaigns.schema import read_campaign
 from conespot.campaigns.store import goes_on, read_begun_with
-from conespot.campaigns.worker import Measures
 from conespot.results.crops import FILE, Crop, Crops
 from conespot.results.rows import Rows
 from conespot.results.run import load_run
@@ -30,13 +27,12 @@ MOST_FRAMES, MOST_UNASKED = 40, 12
 #: a run of fewer rows gets no crops unasked: `campaign debug` draws any of them
 FEWEST_ROWS = 300
 _ERROR = "position_error_mm"
-_Crops = TypeAdapter(tuple[Crop, ...])
 
 #: a frame, and who looks at it: case, pose, localizers
 Wanted = dict[tuple[str, int], tuple[str, ...]]
 
 
-def keep_crops(folder: Path, per_box: int | None, workers: int) -> None:
+def keep_crops(folder: Path, per_box: int | None, executor: Executor) -> None:
     """Write crops.json of a run folder: the `per_box` worst frames of each box, by default one of a run of some size.
 
     Raises InputError for a folder that is no run, or of a version that named cases otherwise, RunError if nothing can
@@ -51,15 +47,13 @@ def keep_crops(folder: Path, per_box: int | None, workers: int) -> None:
         raise InputError(f"{folder}: was begun by conespot {begun_with.get('conespot')}, which named cases otherwise")
     plan = make_plan(read_campaign(str(folder / "campaign.yaml")))
     wanted, left_out = worst_frames(run.rows, asked, MOST_UNASKED if per_box is None else MOST_FRAMES)
-    units = _units(plan, wanted)
-    with tempfile.TemporaryDirectory() as temporary:
-        pool = LocalPool(workers, functools.partial(make_cropper, wanted))
-        for record in pool.execute(plan, units, frames=Path(temporary), note=lambda said: None):
-            if record.error:
-                sys.stderr.write(f"no crop of {record.unit}: {record.error}\n")
-        # in the order of the rows, whoever was first
-        found = [crop for path in Path(temporary).glob("*.json") for crop in _Crops.validate_json(path.read_bytes())]
-    found.sort(key=lambda crop: (crop.case, crop.pose, crop.localizer))
+    found: list[Crop] = []
+    for record in executor.execute(plan, _units(plan, wanted), frames=None, note=lambda said: None):
+        if record.error:
+            sys.stderr.write(f"no crop of {record.unit}: {record.error}\n")
+        if isinstance(record, Cropped):
+            found += record.crops
+    found.sort(key=lambda crop: (crop.case, crop.pose, crop.localizer))  # whoever was first
     kept = Crops(per_box=asked, left_out=left_out, crops=tuple(found))
     write_atomically(folder / FILE, kept.model_dump_json().encode())
 
@@ -94,48 +88,13 @@ def _refused(frame: pd.DataFrame) -> pd.DataFrame:
     return first.sort_values("times", ascending=False, kind="stable")[["case", "pose", "localizer"]]
 
 
-def _units(plan: Plan, wanted: Wanted) -> list[Unit]:
+def _units(plan: Plan, wanted: Wanted) -> list[ToCrop]:
     found = []
     for number, group in enumerate(plan.groups):
         mine = {case.key for case in group.cases}
-        poses = sorted({pose for case, pose in wanted if case in mine and pose < len(group.positions)})
-        found += [Unit(number, pose, group.unit(pose)) for pose in poses]
+        seen: dict[int, list[tuple[str, tuple[str, ...]]]] = {}
+        for (case, pose), localizers in wanted.items():
+            if case in mine and pose < len(group.positions):
+                seen.setdefault(pose, []).append((case, localizers))
+        found += [ToCrop(number, pose, group.unit(pose), tuple(seen[pose])) for pose in sorted(seen)]
     return found
-
-
-def make_cropper(wanted: Wanted, plan: Plan, folder: Path | None) -> Measures:
-    """What draws crops in a worker's process, a file a unit in the folder."""
-    assert folder is not None
-    return Cropper(plan, wanted, folder)
-
-
-class Cropper:
-    """Looks at the wanted frames of a unit again and keeps a crop for each localizer."""
-
-    def __init__(self, plan: Plan, wanted: Wanted, folder: Path) -> None:
-        from conespot.campaigns.bench import Bench
-
-        self._bench = Bench(plan, None)
-        self._plan, self._wanted, self._folder = plan, wanted, folder
-        self.variant = self._bench.variant
-
-    @property
-    def worn(self) -> bool:
-        """True when the process should make room for a fresh one."""
-        return self._bench.worn
-
-    def measure(self, unit: Unit) -> Record:
-        """The unit's findings that were drawn; the crops are in a file of its name."""
-        from conespot.campaigns.bench import finding
-        from conespot.campaigns.easel import overlay_of
-        from conespot.results.crops import crop_of
-
-        crops, findings = [], []
-        for case, image, unlit in self._bench.given(unit, {case for case, pose in self._wanted if pose == unit.pose}):
-            for name in self._wanted[case.key, unit.pose]:
-                outcome = self._bench.located(unit, case, image, name, unlit)
-                overlay = overlay_of(self._plan, unit, case, image, name, outcome, residuals=False)
-                crops.append(crop_of(case.key, name, unit.pose, overlay))
-                findings.append(finding(case, name, outcome, None))
-        (self._folder / f"{unit.key}.json").write_bytes(_Crops.dump_json(tuple(crops)))
-        return Record(unit=unit.key, findings=tuple(findings))

@@ -14,7 +14,7 @@ from conespot.localize.account import account
 from conespot.localize.image import AnyImage, white_level
 from conespot.localize.outcome import LocalizationFailure, Outcome
 from conespot.render.frame_file import write_preview
-from conespot.results.overlay import Overlay, Residual, draw_overlay
+from conespot.results.overlay import Overlay, Residual
 
 
 class Easel:
@@ -40,6 +40,8 @@ class Easel:
         )
 
     def _draw(self, unit: Unit, case: Case, image: AnyImage, localizer: str, outcome: Outcome) -> None:
+        from conespot.results.overlay_picture import draw_overlay  # with matplotlib, which who draws crops does without
+
         said = outcome.reason if isinstance(outcome, LocalizationFailure) else "localized"
         draw_overlay(
             overlay_of(self._plan, unit, case, image, localizer, outcome),

@@ -11,7 +11,8 @@ from conespot.localize.account import account
 from conespot.localize.image import white_level
 from conespot.localize.needle import Needle
 from conespot.localize.outcome import Localization
-from conespot.results.overlay import Mark, Overlay, Residual, draw_overlay
+from conespot.results.overlay import Mark, Overlay, Residual
+from conespot.results.overlay_picture import draw_overlay
 from conespot.scene.scene import Scene
 
 #: the ellipsoid is drawn at least so large [px] a pixel of the frame's width, by a factor that stands beside it

@@ -5,6 +5,7 @@ A unit whose code raises, or that loses its worker twice, becomes a record with 
 
 from __future__ import annotations
 
+import contextlib
 from collections.abc import Callable, Generator, Iterable, Iterator
 from dataclasses import dataclass
 from multiprocessing.connection import wait
@@ -12,6 +13,7 @@ from pathlib import Path
 from typing import assert_never
 
 from conespot.campaigns.ending import RunError
+from conespot.campaigns.executor import Executor
 from conespot.campaigns.interruption import interruption
 from conespot.campaigns.losses import REMEDY, Losses
 from conespot.campaigns.plan import Plan, Unit
@@ -41,16 +43,15 @@ class LocalPool:
         Raises RunError if workers cannot start. Ends early when an interruption is asked for. Closing the iterator
         stops the workers.
         """
-        waiting = list(units)
-        places = max(1, min(self.workers, len(waiting)))
-        crew = _Crew(plan, waiting, places, note, lambda: Worker(plan, frames, self.make), self.limit_s)
+        with self.staying() as crew:
+            yield from crew.execute(plan, units, frames=frames, note=note)
+
+    @contextlib.contextmanager
+    def staying(self) -> Iterator[Executor]:
+        """An executor whose workers stay when their units are finished, for more units of the same plan."""
+        crew = _Crew(self)
         try:
-            while not interruption.asked and crew.hand_out():
-                for worker in crew.wait():
-                    record = crew.hear(worker)
-                    if record is not None:
-                        yield record
-                yield from crew.lose_the_slow()
+            yield crew
         finally:
             crew.end()
 
@@ -58,20 +59,27 @@ class LocalPool:
 class _Crew:
     """Workers at their places, what they are busy with, and what became of those that were lost."""
 
-    def __init__(
-        self,
-        plan: Plan,
-        units: Iterable[Unit],
-        places: int,
-        note: Callable[[str], None],
-        hire: Callable[[], Worker],
-        limit_s: float,
-    ) -> None:
-        self._note, self._hire, self._limit_s = note, hire, limit_s
-        self._waiting = Waiting(plan, units)
-        self._losses = Losses(plan, self._waiting, note)
-        self._places: list[Worker | None] = [None] * places
+    def __init__(self, pool: LocalPool) -> None:
+        self._pool = pool
+        self._places: list[Worker | None] = [None] * max(1, pool.workers)
         self._noted: set[str] = set()
+
+    def execute(
+        self, plan: Plan, units: Iterable[Unit], *, frames: Path | None, note: Callable[[str], None]
+    ) -> Generator[Record]:
+        """As `LocalPool.execute`. Who is busy when this ends is stopped, and nobody else."""
+        self._hire: Callable[[], Worker] = lambda: Worker(plan, frames, self._pool.make)
+        self._note, self._waiting = note, Waiting(plan, units)
+        self._losses = Losses(plan, self._waiting, note)
+        try:
+            while not interruption.asked and self.hand_out():
+                for worker in self.wait():
+                    record = self.hear(worker)
+                    if record is not None:
+                        yield record
+                yield from self.lose_the_slow()
+        finally:
+            self._stop_the_busy()
 
     def _workers(self) -> Iterator[Worker]:
         return (worker for worker in self._places if worker is not None)
@@ -126,8 +134,8 @@ class _Crew:
     def lose_the_slow(self) -> Iterator[Record]:
         """Stop the workers whose pose takes too long, as if they had died of it; records of what is given up."""
         for worker in list(self._workers()):
-            if worker.unit is not None and worker.since > self._limit_s:
-                record = self._lose(worker, f"took longer than {self._limit_s:g} s", at_once=True)
+            if worker.unit is not None and worker.since > self._pool.limit_s:
+                record = self._lose(worker, f"took longer than {self._pool.limit_s:g} s", at_once=True)
                 if record is not None:
                     yield record
 
@@ -144,7 +152,13 @@ class _Crew:
         self._waiting.put_back([worker.unit] if worker.unit else [])
         worker.end(at_once)
 
+    def _stop_the_busy(self) -> None:
+        for worker in list(self._workers()):
+            if worker.unit is not None:
+                self._dismiss(worker, at_once=True)
+
     def end(self) -> None:
-        """Stop everybody, at once who is busy."""
+        """Stop everybody."""
+        self._stop_the_busy()
         for worker in self._workers():
-            worker.end(at_once=worker.unit is not None)
+            worker.end()

@@ -98,33 +98,40 @@ def carry_out(
     units = shard.units(plan) if shard and plan.cases else list(plan.units())
     name = plan.campaign.name + (f"-{shard.number}-of-{shard.count}" if shard else "")
     folder = Path(out or Path("runs") / name)
-    with open_store(folder, plan, document) as store:
-        if shard:
-            store.poses = len(units)
-        left = [unit for unit in units if choose(store.entries.get(unit.key))]
-        if plan.cases and _measure(store, executor, left, Watch(store, units, left, log)):
-            done = f"{len(store.entries)} of {len(units)} poses are kept"
-            return Session(folder, interrupted=f"interrupted; {done}, and the same command continues the run")
-        if plan.campaign.theory:
-            _write_theory(folder)
-        lost = tuple(entry.error for entry in store.entries.values() if entry.error)
-    workers = executor.workers if isinstance(executor, LocalPool) else 1
-    finish(folder, crops if plan.cases and not lost else 0, workers)
+    with contextlib.ExitStack() as meanwhile:
+        # whoever measures here draws the crops too, with the scene at hand that it has loaded
+        here = meanwhile.enter_context(executor.staying()) if isinstance(executor, LocalPool) else None
+        with open_store(folder, plan, document) as store:
+            if shard:
+                store.poses = len(units)
+            left = [unit for unit in units if choose(store.entries.get(unit.key))]
+            if plan.cases and _measure(store, here or executor, left, Watch(store, units, left, log)):
+                done = f"{len(store.entries)} of {len(units)} poses are kept"
+                return Session(folder, interrupted=f"interrupted; {done}, and the same command continues the run")
+            if plan.campaign.theory:
+                _write_theory(folder)
+            lost = tuple(entry.error for entry in store.entries.values() if entry.error)
+        if plan.cases and not lost and crops != 0:
+            _keep_crops(folder, crops, here or LocalPool())
+    finish(folder)
     return Session(folder, lost)
 
 
-def finish(folder: Path, crops: int | None = 0, workers: int = 1) -> None:
-    """Write crops, tables, figures and report of the rows that a run folder holds. Raises InputError."""
+def _keep_crops(folder: Path, crops: int | None, executor: Executor) -> None:
+    from conespot.campaigns.cropping import keep_crops
+
+    with alone(folder):
+        try:
+            keep_crops(folder, crops, executor)
+        except RunError as error:  # the rows are whole without a picture
+            sys.stderr.write(f"no crops: {error}\n")
+
+
+def finish(folder: Path) -> None:
+    """Write tables, figures and report of the rows that a run folder holds. Raises InputError."""
     from conespot.results import write_results
 
     with alone(folder):
-        if crops != 0:
-            from conespot.campaigns.cropping import keep_crops
-
-            try:
-                keep_crops(folder, crops, workers)
-            except RunError as error:  # the rows are whole without a picture
-                sys.stderr.write(f"no crops: {error}\n")
         write_results(folder)
 
 
@@ -143,7 +150,7 @@ def report(folder: Path, crops: int = 0, workers: int = 1) -> None:
         if crops:
             from conespot.campaigns.cropping import keep_crops
 
-            keep_crops(folder, crops, workers)
+            keep_crops(folder, crops, LocalPool(workers))
         write_results(folder)
 
 

@@ -32,7 +32,7 @@ _DEAF = [number for number in SIGNALS if number != signal.SIGTERM]
 
 
 class Measures(Protocol):
-    """What a worker does with a unit; `campaigns.bench.Bench` but in tests."""
+    """What a worker does with a unit; `campaigns.cropper.Cropper` with its bench but in tests."""
 
     @property
     def variant(self) -> str:
@@ -56,8 +56,9 @@ MakeBench = Callable[[Plan, Path | None], Measures]
 def make_bench(plan: Plan, frames: Path | None) -> Measures:
     """The bench of a worker, imported where it is used: the parent process never loads Mitsuba."""
     from conespot.campaigns.bench import Bench
+    from conespot.campaigns.cropper import Cropper
 
-    return Bench(plan, frames)
+    return Cropper(plan, Bench(plan, frames))
 
 
 @dataclass(frozen=True)

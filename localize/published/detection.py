@@ -112,9 +112,12 @@ def contrast(grey: Grey, mask: Mask, scene: Scene) -> float:
     height, width = mask.bright.shape
     inside = cv2.mean(grey[mask.top : mask.top + height, mask.left : mask.left + width], mask=mask.bright)[0]
     step = max(1, max(grey.shape) // PUBLISHED.contrast_px)
-    rest = np.ones(grey.shape, bool)
-    rest[mask.top : mask.top + height, mask.left : mask.left + width] = mask.bright == 0
-    around = grey[::step, ::step][rest[::step, ::step]]
+    some = grey[::step, ::step]
+    rest = np.ones(some.shape, bool)
+    top, left = -(-mask.top // step), -(-mask.left // step)  # the first of those rows and columns in the mask
+    dark = mask.bright[top * step - mask.top :: step, left * step - mask.left :: step] == 0
+    rest[top : top + dark.shape[0], left : left + dark.shape[1]] = dark
+    around = some[rest]
     level = float(around.mean()) if around.size else inside
     levels = np.array([inside, level]) / 255.0
     lit, ground = scene.sensor.decode(levels)

@@ -11,6 +11,7 @@ from pathlib import Path
 import pytest
 
 from conespot.campaigns.cropping import keep_crops
+from conespot.campaigns.pool import LocalPool
 from conespot.campaigns.session import report
 from conespot.campaigns.session import run_campaign as carry_out
 from conespot.results import load_run
@@ -30,7 +31,7 @@ def page_of_a_run(tmp_path_factory):
     run = carry_out(
         "reproduce_ci", folder / "run", workers=2, settings={"poses": "5", "scene.camera.resolution": "700"}
     )
-    keep_crops(run, 1, 2)
+    keep_crops(run, 1, LocalPool(2))
     report(run)
     return run / "report.html"
 

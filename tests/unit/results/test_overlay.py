@@ -4,7 +4,8 @@ import cv2
 import numpy as np
 import pytest
 
-from conespot.results.overlay import Overlay, Residual, draw_overlay
+from conespot.results.overlay import Overlay, Residual
+from conespot.results.overlay_picture import draw_overlay
 
 ANGLE = np.linspace(0.0, 2.0 * np.pi, 50)
 CIRCLE = 40.0 + 12.0 * np.column_stack([np.cos(ANGLE), np.sin(ANGLE)])
