@@ -10,7 +10,7 @@ import pandas as pd
 from conespot.results.cases import Case
 from conespot.scene.power import BothConventions
 
-NOT_STATED = "not stated"
+NOT_STATED, NOT_USED = "not stated", "not used"
 _MOST = 4
 _OR = " or "
 
@@ -72,8 +72,7 @@ def common(sets: Iterable[Assumptions]) -> dict[str, str]:
 
 def theory_assumptions() -> Assumptions:
     """The assumption set of Table I: by definition the paper's sphere (z0 = -7 mm), with no light and no image."""
-    none = "not used"
-    return Assumptions("12 mm", none, none, none, "smooth", none, none)
+    return Assumptions("12 mm", NOT_USED, NOT_USED, NOT_USED, "smooth", NOT_USED, NOT_USED)
 
 
 def _of(case: Case | None, localizer: str) -> Assumptions:

@@ -47,7 +47,13 @@ def plan_figures(run: Run, boxes: pd.DataFrame | None) -> tuple[list[Drawing], i
                 stem = kind.stem(cut)  # long names may only differ in what a file name leaves out
                 name = f"{stem}-{len(found) + 1}" if stem in found else stem
                 found[name] = Drawing(name, kind.title(cut), kind.caption(cut), kind, cut)
-    drawings = sorted(found.values(), key=lambda drawing: not drawing.name.startswith("figure"))
+    variants = list(dict.fromkeys(drawing.cut.variant.slug for drawing in found.values()))
+
+    def place(drawing: Drawing) -> tuple[bool, int, int]:  # a variant's figures as the paper numbers them
+        kind = list(FIGURES).index(drawing.kind.name)
+        return not drawing.name.startswith("figure"), variants.index(drawing.cut.variant.slug), kind
+
+    drawings = sorted(found.values(), key=place)
     return drawings[:_MOST_FIGURES], max(len(drawings) - _MOST_FIGURES, 0)
 
 

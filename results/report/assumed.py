@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from conespot.results.assumptions import Assumptions, assumptions, common, pairs
+from conespot.results.assumptions import NOT_USED, Assumptions, assumptions, common, pairs
 from conespot.results.run import Run
 from conespot.results.table import Block
 from conespot.results.variants import ordered, split
@@ -25,7 +25,8 @@ class Assumed:
         if one is None:
             return ""
         told = one.columns()
-        return one.sentence(beside=[name for name, words in self.columns.items() if told[name] == words])
+        shared = self.columns
+        return one.sentence(beside=[name for name, words in told.items() if words in (NOT_USED, shared.get(name))])
 
     @property
     def columns(self) -> dict[str, str]:

@@ -43,7 +43,7 @@ def paths(run: Run) -> list[Path]:
 def space() -> Json:
     """The layout of a path in space."""
     axes = {f"{axis}axis": {"title": {"text": f"{axis} [mm]"}} for axis in "xyz"}
-    camera = {"eye": {"x": 1.35, "y": -1.35, "z": 0.75}}
+    camera = {"eye": {"x": 1.5, "y": -1.5, "z": 0.85}, "center": {"x": 0, "y": 0, "z": -0.06}}
     return {
         "height": 560, "scene": {**axes, "aspectmode": "data", "camera": camera},
         "margin": {"l": 0, "r": 0, "t": 40, "b": 0},

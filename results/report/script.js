@@ -195,6 +195,7 @@
       view.replaceChildren(crop.querySelector("svg").cloneNode(true));
       dialog.querySelector("h2").textContent = crop.querySelector(".error").textContent;
       dialog.querySelector(".about").textContent = crop.querySelector(".about").textContent;
+      for (const box of dialog.querySelectorAll(".layers input")) box.parentElement.hidden = !view.querySelector(`.${box.value}`);
       layer();
     } else {
       view.replaceChildren();

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
+from itertools import pairwise
 
 import numpy as np
 import pandas as pd
@@ -17,6 +18,7 @@ from conespot.results.variants import split
 _SHADES = ("single", "triple", "y", "paper", "about-y", "about-z", "overall", "failed")
 _DASHES = ("solid", "dash", "dot", "dashdot")
 _MOST_LINES, _MOST_BARS, _MOST_REASONS, _MOST_POINTS = 24, 40, 6, 200
+_MOST_TICKS, _APART = 12, 1.12  #: numbers on an axis, and by what factor they differ so that none stands over another
 _ERROR = "position_error_mm"
 
 
@@ -33,13 +35,15 @@ def accuracy(run: Run) -> dict[str, tuple[list[Json], Json]]:
         named = "share of the exposure limit, spotlights alone"
         found["exposure"] = _lines(run, exposed, named, lambda x: f"{x} of the limit")
         found["exposure"][1]["shapes"] = [_limit()]
+        ends = np.log10([min(1.0, exposed[exposed > 0.0].min()), max(1.0, exposed.max())])
+        found["exposure"][1]["xaxis"] |= {"range": (ends + [-0.15, 0.15]).tolist()}
     return found
 
 
 def _lines(run: Run, places: pd.Series, x: str, said: Callable[[str], str]) -> tuple[list[Json], Json]:
     assert run.rows is not None
     layout = panels([[""]], x, ["median position error [mm]"], height=380)
-    layout["xaxis"] |= {"type": "log"}
+    layout["xaxis"] |= {"type": "log", **_ticks(places)}
     layout["yaxis"] |= {"type": "log"}
     traces: list[Json] = []
     frame = run.rows.frame[[*run.rows.group, "status", _ERROR]].assign(place=places)
@@ -54,6 +58,20 @@ def _lines(run: Run, places: pd.Series, x: str, said: Callable[[str], str]) -> t
                 where = f"{trajectory}, {rig_words(str(rig))}" + ("" if surface == "smooth" else f", {surface}")
                 traces.append(_line(boxes, f"{variant.label}: {where}", k, j, said))
     return traces, layout
+
+
+def _ticks(places: pd.Series) -> Json:
+    """Where a logarithmic axis has numbers: at its few places, or at whole decades with the digits between them."""
+    there = sorted({float(f"{place:.3g}") for place in places[places > 0.0]})
+    apart = all(b > _APART * a for a, b in pairwise(there))
+    if apart and len(there) <= _MOST_TICKS:
+        return {"tickmode": "array", "tickvals": there, "ticktext": [f"{place:g}" for place in there]}
+    return {
+        "dtick": 1,
+        "exponentformat": "none",
+        "separatethousands": True,
+        "minor": {"dtick": "D1", "ticks": "outside"},
+    }
 
 
 def _boxes(rows: pd.DataFrame) -> pd.DataFrame:
@@ -81,7 +99,13 @@ def _line(boxes: pd.DataFrame, name: str, shade: int, dash: int, said: Callable[
 
 def _limit() -> Json:
     line = {"color": tone("failed"), "width": 1.5, "dash": "dash"}
-    label = {"text": "limit", "textposition": "start", "font": {"color": tone("failed")}}
+    label = {
+        "text": "limit",
+        "textangle": 0,
+        "textposition": "end",
+        "xanchor": "left",
+        "font": {"color": tone("failed")},
+    }
     return {"type": "line", "x0": 1, "x1": 1, "y0": 0, "y1": 1, "yref": "paper", "line": line, "label": label}
 
 
