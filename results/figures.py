@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+import contextlib
+import itertools
 import multiprocessing
 import os
 import signal
 import warnings
 from collections.abc import Iterator
 from dataclasses import dataclass
+from multiprocessing.process import BaseProcess
 from pathlib import Path
 
 import pandas as pd
@@ -58,23 +61,30 @@ def plan_figures(run: Run, boxes: pd.DataFrame | None) -> tuple[list[Drawing], i
 
 
 def draw_figures(drawings: list[Drawing], folder: Path) -> list[Path]:
-    """Draw them as PNG and SVG into the folder, on all cores where the system can fork. Raises InputError."""
+    """Draw them as PNG, SVG and PDF into the folder, on all cores where the system can fork. Raises InputError."""
+    with drawn_meanwhile(drawings, folder) as paths:
+        pass
+    return paths
+
+
+@contextlib.contextmanager
+def drawn_meanwhile(drawings: list[Drawing], folder: Path) -> Iterator[list[Path]]:
+    """The files of `draw_figures`, drawn while something else is done, and there when the context ends."""
     cores = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else 1
     shares = [drawings[i::cores] for i in range(cores) if drawings[i::cores]]
-    helpers = []
-    for share in shares[1:]:
+    helpers: list[BaseProcess] = []
+    for share in shares if cores > 1 else ():
         helpers.append(multiprocessing.get_context("fork").Process(target=_help, args=(share, folder), daemon=True))
         with warnings.catch_warnings():
             # of threads that might hold what drawing needs: those of Arrow and BLAS do not
             warnings.simplefilter("ignore", DeprecationWarning)
             helpers[-1].start()
-    for share in shares[:1]:
-        _draw(share, folder)
-    for helper, share in zip(helpers, shares[1:], strict=True):
-        helper.join()
-        if helper.exitcode:
+    yield [path for drawing in drawings for path in files(folder / drawing.name)]
+    for share, helper in itertools.zip_longest(shares, helpers):
+        if helper is not None:
+            helper.join()
+        if helper is None or helper.exitcode:
             _draw(share, folder)  # says what is wrong, or has memory enough now
-    return [path for drawing in drawings for path in files(folder / drawing.name)]
 
 
 def _draw(drawings: list[Drawing], folder: Path) -> None:

@@ -62,6 +62,7 @@ _RC: Any = {
     "path.simplify": True,
 }
 _DPI = 150
+_PNG_LEVEL = 3  #: in two thirds of the time of 6, and 5 % larger
 _NO_DATE = {"Date": None, "Creator": None}
 _UNDATED = {"CreationDate": None, "Creator": None, "Producer": None}
 #: what a figure is written as
@@ -94,7 +95,8 @@ def save(figure: Figure, stem: Path) -> list[Path]:
         figure.set_layout_engine("none")
         for axes in figure.axes:
             _pin_labels(axes)
-    canvas.print_png(written["png"], metadata={"Software": None})  # type: ignore[no-untyped-call]
+    options = {"compress_level": _PNG_LEVEL}
+    canvas.print_png(written["png"], metadata={"Software": None}, pil_kwargs=options)  # type: ignore[no-untyped-call]
     FigureCanvasSVG(figure).print_svg(written["svg"], metadata=_NO_DATE)  # type: ignore[no-untyped-call]
     FigureCanvasPdf(figure).print_pdf(written["pdf"], metadata=_UNDATED)  # type: ignore[no-untyped-call]
     for path, stream in zip(files(stem), written.values(), strict=True):

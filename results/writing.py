@@ -5,8 +5,9 @@ from __future__ import annotations
 from pathlib import Path
 
 from conespot.results.boxes import box_table, encode_boxes, read_boxes
-from conespot.results.figures import FIGURES, draw_figures, plan_figures
+from conespot.results.figures import FIGURES, draw_figures, drawn_meanwhile, plan_figures
 from conespot.results.report import make_report
+from conespot.results.report.charts import pictures
 from conespot.results.run import load_run
 from conespot.results.tables import TABLE_NAMES, make_tables
 from conespot.scene import InputError
@@ -41,9 +42,15 @@ def write_results(run: str | Path) -> list[Path]:
         write_atomically(folders["tables"] / name, text.encode())
         written.append(folders["tables"] / name)
     drawings, left_out = plan_figures(found, boxes)
-    written += draw_figures(drawings, folders["figures"])
+    shown = pictures(drawings)  # on the page itself
+    written += draw_figures(shown, folders["figures"])
+    names = {drawing.name for drawing in shown}
+    rest = [drawing for drawing in drawings if drawing.name not in names]
+    with drawn_meanwhile(rest, folders["figures"]) as paths:
+        page = make_report(found, tables, drawings, left_out, folders["figures"])
+    written += paths
     report = run / "report.html"
-    write_atomically(report, make_report(found, tables, drawings, left_out, folders["figures"]))
+    write_atomically(report, page)
     _clear(folders, written)
     return [*written, report]
 

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from typing import Any
 
+import numpy as np
 import pandas as pd
 
 from conespot.results.columns import column
@@ -109,17 +109,17 @@ def _beyond(
     boxes: pd.DataFrame, rows: pd.DataFrame, metric: str, rig: str, places: dict[float, int], first: bool
 ) -> Json:
     """The frames beyond the whiskers: a click on one shows it."""
-    x: list[int] = []
-    y: list[float] = []
-    told: list[list[Any]] = []
-    by_power = dict(iter(rows.groupby("power_w", sort=False)))
+    errors, powers = rows[metric].to_numpy(float), rows["power_w"].to_numpy(float)
+    outside: list[int] = []
     for power, low, high in boxes[["power_w", "whisker_low", "whisker_high"]].itertuples(index=False):
-        here = by_power.get(power, rows.iloc[:0])
         spare = 1e-8 * abs(high)  # the stored boxes have nine digits
-        outside = here[(here[metric] < low - spare) | (here[metric] > high + spare)].nlargest(_MOST_BEYOND, metric)
-        x += [places[power]] * len(outside)
-        y += outside[metric].tolist()
-        told += [[frame_of(row), int(row["pose"])] for row in outside.to_dict("records")]
+        here = np.flatnonzero((powers == power) & ((errors < low - spare) | (errors > high + spare)))
+        outside += here[np.argsort(-errors[here], kind="stable")][:_MOST_BEYOND].tolist()
+    told = [
+        [frame_of(row), int(row["pose"])]
+        for row in rows[["case", "localizer", "pose"]].iloc[outside].to_dict("records")
+    ]
+    x, y = [places[power] for power in powers[outside]], errors[outside]
     unit = column(metric).unit
     return {
         "type": "scatter", "mode": "markers", "x": x, "y": numbers(y), "customdata": told, "showlegend": first,

@@ -204,7 +204,7 @@ def test_an_interrupted_write_leaves_no_half_file(tmp_path, make_run, make_rows,
     def interrupt(*_):
         raise KeyboardInterrupt
 
-    monkeypatch.setattr("conespot.results.writing.draw_figures", interrupt)
+    monkeypatch.setattr("conespot.results.writing.drawn_meanwhile", interrupt)
     with pytest.raises(KeyboardInterrupt):
         write_results(folder)
     assert not (folder / "report.html").exists()
