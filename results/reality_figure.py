@@ -46,8 +46,7 @@ class RealityGap(FigureKind):
         frames = max((cost.frames for cost in costs(cut.rows).values()), default=0)
         return (
             f"Marks: median over the frames that were localized, of {frames} each; beside a mark how many were refused."
-            " A mark on the right edge: all were. Localizers' models know no blur, no deep light and no motion.\n"
-            + _assumed(cut)
+            " A mark on the right edge: all were.\n" + _assumed(cut)
         )
 
     def draw(self, cut: Cut, title: str, caption: str) -> Figure:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -13,6 +14,7 @@ from conespot.results.assumptions import Assumptions, common
 
 _MOST_BLOCKS = 24
 _MOST_LINES = 400
+_WORD = re.compile(r"[^\W\d_]{4}")
 
 
 @dataclass(frozen=True)
@@ -29,7 +31,7 @@ class Block:
     def flush_right(self) -> tuple[bool, ...]:
         """Which columns hold numbers."""
         columns = list(zip(*self.lines, strict=True)) or [()] * len(self.header)
-        return tuple(all(not cell or cell[0] in "–-+.0123456789" for cell in column) for column in columns)
+        return tuple(all(not cell or _is_number(cell) for cell in column) for column in columns)
 
 
 @dataclass(frozen=True)
@@ -95,9 +97,16 @@ class Table:
         return "\n\n".join([*parts, *map(_escaped, self.last_notes)]) + "\n"
 
 
+def _is_number(cell: str) -> bool:
+    """Whether a cell is a number, perhaps with a unit; "12 mm seen through ..." is words."""
+    return cell[0] in "–-+.0123456789" and not _WORD.search(cell)
+
+
 def number(value: float) -> str:
     """A number as people read it: three digits, a dash for none."""
-    return f"{value:.3g}" if math.isfinite(value) else "–"
+    if not math.isfinite(value):
+        return "–"
+    return f"{float(f'{value:.3g}'):.0f}" if 1e3 <= abs(value) < 1e6 else f"{value:.3g}"
 
 
 def _line(row: Sequence[str], widths: Sequence[int], flush: Sequence[bool]) -> str:

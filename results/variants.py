@@ -37,7 +37,7 @@ class Variant:
 def split(frame: pd.DataFrame, group: Sequence[str]) -> list[tuple[Variant, pd.DataFrame]]:
     """The variants among rows or boxes with these `group` columns, each with its part, in a stable order."""
     names = ["localizer", *(name for name in group if name not in AXES and name != "localizer")]
-    telling = [name for name in names if name == "localizer" or frame[name].nunique() > 1]
+    telling = _telling(frame, names)
     found: list[tuple[Variant, pd.DataFrame]] = []
     taken: set[str] = set()
     for values, part in frame.groupby(names, sort=True):
@@ -49,6 +49,16 @@ def split(frame: pd.DataFrame, group: Sequence[str]) -> list[tuple[Variant, pd.D
         taken.add(slug.lower())
         found.append((Variant(setting, label, slug), part))
     return found
+
+
+def _telling(frame: pd.DataFrame, names: Sequence[str]) -> list[str]:
+    """The columns that name a variant: those that vary, but not what a campaign's own named choices say already."""
+    varying = [name for name in names if name == "localizer" or frame[name].nunique() > 1]
+    chosen = [name for name in varying if name not in SETTING]
+    if not chosen:
+        return varying
+    combinations = frame[varying].drop_duplicates().groupby(chosen)
+    return [n for n in varying if n == "localizer" or n in chosen or combinations[n].nunique().max() > 1]
 
 
 def paired(run: Run, boxes: pd.DataFrame) -> list[tuple[Variant, pd.DataFrame, pd.DataFrame]]:
@@ -73,6 +83,8 @@ def by_axes(frame: pd.DataFrame) -> Iterator[tuple[dict[str, Any], pd.DataFrame]
 
 def named(name: str, value: Any) -> str:
     """The value of a column in words: with its unit, or with the name of a swept key."""
+    if name == "power_w" and 0.0 < value < 1e-3:
+        return f"{1e3 * value:g} mW"
     text = f"{value:g}" if isinstance(value, float) else str(value)
     if name not in SETTING:
         return f"{name.removeprefix('scene.')} {text}"

@@ -60,14 +60,22 @@ def survey_charts(run: Run) -> dict[str, Chart]:
         ),
     }
     for name, (traces, layout) in accuracy(run).items():
+        if not traces:  # each setting has one power
+            continue
         title, caption = said[name]
         words = f"{title}: {len(traces)} lines of median position errors. The tables hold the numbers."
         found[name] = Chart(f"survey-{name}", title, caption, words, traces, layout)
     covered = coverage(run)
     if covered is not None:
+        traces, layout, left_out = covered
         title = "How many frames were localized, and why not the others"
         words = "Bars of the shares of frames. The table of refusals holds the numbers."
-        found["coverage"] = Chart("survey-coverage", title, "", words, *covered)
+        caption = (
+            f"{left_out} more settings, of which none or no larger share was refused, are not drawn."
+            if left_out
+            else ""
+        )
+        found["coverage"] = Chart("survey-coverage", title, caption, words, traces, layout)
     return found
 
 
@@ -102,7 +110,7 @@ def path_charts(run: Run) -> list[Chart]:
     found = []
     for number, (name, traces) in enumerate(paths(run)):
         words = f"The path of the tip in space, {name}: true and found tips, and the ends of the needles."
-        found.append(Chart(f"path-{number}", name, "", words, traces, space()))
+        found.append(Chart(f"path-{number}", name, "", words, traces, space(traces)))
     return found
 
 

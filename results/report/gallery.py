@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import pandas as pd
 
 from conespot.results.crops import Crop, Crops
-from conespot.results.report.words import rig_words
+from conespot.results.report.words import rig_words, um
 from conespot.results.run import Run
 from conespot.results.variants import named
 
@@ -47,7 +47,7 @@ def gallery(run: Run, crops: Crops) -> list[Picture]:
         if row is not None:
             failed = row["status"] != "ok"
             said = f"not localized: {row['reason']}" if failed else (
-                f"{1e3 * row['position_error_mm']:.3g} um, {row['rotation_error_deg']:.3g} deg off")  # fmt: skip
+                f"{um(row['position_error_mm'])}, {row['rotation_error_deg']:.3g} deg off")  # fmt: skip
             told = [named(name, row[name]) for name in (*_LABELS, *run.rows.swept) if _tells(frame, name)]
             about = ", ".join([crop.localizer, rig_words(row["spotlights"]), *told, f"pose {crop.pose}"])
             found.append(Picture(crop, said, about, -1.0 if failed else -float(row["position_error_mm"])))

@@ -5,8 +5,9 @@ from __future__ import annotations
 import math
 
 from conespot.results.figure_kind import Cut
-from conespot.results.reality_gap import EFFECT, costs, names
+from conespot.results.reality_gap import EFFECT, Cost, costs, names
 from conespot.results.report.chart import Json, axes, numbers, panels, plain, subplots, tone
+from conespot.results.report.words import um
 
 _SHADES = ("single", "triple", "y", "paper", "about-y", "overall")
 _MARKS = ("circle", "square", "diamond", "triangle-down", "triangle-up", "cross")
@@ -20,20 +21,22 @@ def gap(cut: Cut) -> tuple[list[Json], Json, list[list[str]]]:
     localizers = names(cut.rows, "localizer")[: len(_SHADES)]
     titles = [[plain(light) for light in lights]]
     layout = panels(titles, "median position error [um]", [""], height=120 + 34 * len(effects))
+    medians = [1e3 * cost.median for cost in found.values() if cost.median > 0.0]
+    edge = 2.4 * max(medians, default=10.0)  # where all were refused
     traces: list[Json] = []
     for k, light in enumerate(lights):
         for j, localizer in enumerate(localizers):
             there = [(i, found[localizer, e, light]) for i, e in enumerate(effects) if (localizer, e, light) in found]
-            there = [(i, cost) for i, cost in there if math.isfinite(cost.median)]
+            x = numbers(1e3 * cost.median if math.isfinite(cost.median) else edge for _, cost in there)
             shift = 0.22 * (j - (len(localizers) - 1) / 2.0)
-            told = [[plain(effects[i]), f"{c.refused} of {c.frames}", f"{1e3 * c.worst:.3g}"] for i, c in there]
-            words = "%{x} um<br>largest %{customdata[2]} um<br>refused %{customdata[1]}"
+            told = [[plain(effects[i]), _said(cost)] for i, cost in there]
             trace = {
-                "type": "scatter", "mode": "markers", "x": numbers(1e3 * cost.median for _, cost in there),
-                "y": [i + shift for i, _ in there], "name": plain(localizer), "legendgroup": localizer,
-                "showlegend": k == 0, "customdata": told,
+                "type": "scatter", "mode": "markers+text", "x": x, "y": [i + shift for i, _ in there],
+                "name": plain(localizer), "legendgroup": localizer, "showlegend": k == 0, "customdata": told,
+                "text": [str(cost.refused or "") for _, cost in there], "textposition": "middle right",
+                "textfont": {"size": 11, "color": tone(_SHADES[j])}, "cliponaxis": False,
                 "marker": {"size": 9, "symbol": _MARKS[j], "color": tone(_SHADES[j])},
-                "hovertemplate": f"<b>%{{customdata[0]}}</b><br>{words}<extra>{plain(localizer)}</extra>",
+                "hovertemplate": f"<b>%{{customdata[0]}}</b><br>%{{customdata[1]}}<extra>{plain(localizer)}</extra>",
             }  # fmt: skip
             traces.append({**trace, **axes(k)})
     for k in range(len(lights)):
@@ -43,3 +46,8 @@ def gap(cut: Cut) -> tuple[list[Json], Json, list[list[str]]]:
         layout[f"yaxis{tail}"] |= {**ticks, "range": [len(effects) - 0.5, -0.5], "automargin": True}
         layout[f"yaxis{tail}"] |= {"showticklabels": k == 0}
     return traces, layout, subplots(1, len(lights))
+
+
+def _said(cost: Cost) -> str:
+    refused = f"refused {cost.refused} of {cost.frames}"
+    return f"{um(cost.median)}<br>largest {um(cost.worst)}<br>{refused}" if math.isfinite(cost.median) else refused

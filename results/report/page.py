@@ -20,6 +20,7 @@ from conespot.results.figures import Drawing
 from conespot.results.light_exposure import light_exposures
 from conespot.results.makers import maker_block, read_makers
 from conespot.results.paper_values import CITATION
+from conespot.results.reality_gap import is_gap
 from conespot.results.report.assumed import assumed
 from conespot.results.report.charts import (
     figure_charts,
@@ -32,7 +33,7 @@ from conespot.results.report.charts import (
 from conespot.results.report.gallery import LINES, gallery
 from conespot.results.report.summary import summary
 from conespot.results.report.theory import theory_tables
-from conespot.results.report.words import share
+from conespot.results.report.words import share, um
 from conespot.results.run import Run
 from conespot.results.table import Block, Table, number
 from conespot.results.variants import AXES, by_axes, ordered, split
@@ -50,7 +51,8 @@ def make_report(run: Run, tables: Sequence[Table], drawings: Sequence[Drawing], 
     crops = read_crops(run.folder)
     surveys = survey_charts(run)
     theory = theory_tables(run.folder)
-    first = [table for name in _PUBLISHED for table in tables if table.name == name]
+    gap = run.rows is not None and is_gap(run)  # whose settings are none of the paper's
+    first = [t for name in _PUBLISHED for t in tables if t.name == name and not (gap and name.startswith("table_"))]
     return fill(
         "page.html",
         name=run.name,
@@ -195,8 +197,8 @@ def _tiles(run: Run) -> list[tuple[str, str, str]]:
     frame = run.rows.frame
     ok = frame["status"] == "ok"
     errors = frame.loc[ok, "position_error_mm"]
-    median = f"{1e3 * errors.median():.3g} um" if len(errors) else "–"
-    worst = f"largest {1e3 * errors.max():.3g} um" if len(errors) else "nothing was localized"
+    median = um(errors.median()) if len(errors) else "–"
+    worst = f"largest {um(errors.max())}" if len(errors) else "nothing was localized"
     return [
         (f"{len(frame):,}", "answers", f"{frame['pose'].nunique():,} poses, {frame['case'].nunique():,} cases"),
         (share(int(ok.sum()), len(frame)), "localized", f"{int((~ok).sum()):,} refused"),

@@ -40,15 +40,29 @@ def paths(run: Run) -> list[Path]:
     return found
 
 
-def space() -> Json:
-    """The layout of a path in space."""
-    axes = {f"{axis}axis": {"title": {"text": f"{axis} [mm]"}} for axis in "xyz"}
+def space(traces: list[Json]) -> Json:
+    """The layout of a path in space: the same scale along all axes, none of them shorter than a third of the longest."""
+    ranges = {axis: _ends([x for trace in traces for x in trace[axis] if x is not None]) for axis in "xyz"}
+    longest = max(high - low for low, high in ranges.values())
+    axes, lengths = {}, {}
+    for axis, (low, high) in ranges.items():
+        half = 0.55 * max(high - low, longest / 3.0)
+        axes[f"{axis}axis"] = {
+            "title": {"text": f"{axis} [mm]"},
+            "range": [(low + high) / 2.0 - half, (low + high) / 2.0 + half],
+        }
+        lengths[axis] = 2.0 * half / longest
     camera = {"eye": {"x": 1.5, "y": -1.5, "z": 0.85}, "center": {"x": 0, "y": 0, "z": -0.06}}
     return {
-        "height": 560, "scene": {**axes, "aspectmode": "data", "camera": camera},
+        "height": 560, "scene": {**axes, "aspectmode": "manual", "aspectratio": lengths, "camera": camera},
         "margin": {"l": 0, "r": 0, "t": 40, "b": 0},
         "legend": {"orientation": "h", "x": 0, "y": 1, "yref": "container", "yanchor": "top"},
     }  # fmt: skip
+
+
+def _ends(values: list[float]) -> tuple[float, float]:
+    low, high = min(values), max(values)
+    return (low, high) if high > low else (low - 0.5, high + 0.5)
 
 
 def _path(rows: pd.DataFrame, rcm: NDArray[np.float64] | None) -> list[Json]:

@@ -12,7 +12,7 @@ from conespot.results.assumptions import pairs, power_in_words
 from conespot.results.check import Verdict, check, expected
 from conespot.results.pose_figure import at_reference_power
 from conespot.results.reality_gap import costs, is_gap, names
-from conespot.results.report.words import share
+from conespot.results.report.words import share, um
 from conespot.results.run import Run
 from conespot.results.variants import split
 
@@ -60,14 +60,14 @@ def _accurate(run: Run) -> str:
     median, mean, most, label, rows = medians[0]
     power = power_in_words(run.cases, pairs(rows), float(rows["power_w"].iloc[0]))
     best = (
-        f"At {power}, {label} places the tip {_um(median)} from the truth at the median "
-        f"({_um(mean)} on average, at most {_um(most)})"
+        f"At {power}, {label} places the tip {um(median)} from the truth at the median "
+        f"({um(mean)} on average, at most {um(most)})"
     )
     if len(medians) == 1:
         return f"{best}."
     worst = medians[-1]
     many = "the other" if len(medians) == 2 else f"the last of {len(medians)}"
-    return f"{best}; {many}, {worst[3]}, {_um(worst[0])}."
+    return f"{best}; {many}, {worst[3]}, {um(worst[0])}."
 
 
 def _beside(run: Run) -> list[str]:
@@ -105,7 +105,3 @@ def _costliest(frame: pd.DataFrame) -> str:
         return ""
     ratio, effect, localizer, light = max(ratios)
     return f"The costliest effect is {effect}: it multiplies the median error of {localizer} in {light} by {ratio:.3g}."
-
-
-def _um(value: float) -> str:
-    return f"{1e3 * value:.3g} um"

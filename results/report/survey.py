@@ -109,19 +109,26 @@ def _limit() -> Json:
     return {"type": "line", "x0": 1, "x1": 1, "y0": 0, "y1": 1, "yref": "paper", "line": line, "label": label}
 
 
-def coverage(run: Run) -> tuple[list[Json], Json] | None:
-    """Bars of the frames that were localized, and of those that were not by reason, for each variant and rig."""
+def coverage(run: Run) -> tuple[list[Json], Json, int] | None:
+    """Bars of the frames that were localized, and of those that were not by reason, for each variant and rig.
+
+    Of many they are those of which the largest shares were refused; last comes how many are left out.
+    """
     if run.rows is None:
         return None
     counted: dict[str, Counter[str]] = {}
     for variant, part in split(run.rows.frame[[*run.rows.group, "status", "reason"]], run.rows.group):
         for rig, here in part.groupby("spotlights", sort=True):
-            if len(counted) == _MOST_BARS:
-                break
             why = here["reason"].where(here["status"] != "ok", "")
             counted[f"{variant.label}, {rig_words(str(rig))}"] = Counter(
                 {" ".join(str(reason).split()): int(n) for reason, n in why.value_counts().items()}
             )
+    left_out = max(0, len(counted) - _MOST_BARS)
+    if left_out:
+        most = sorted(counted, key=lambda label: counted[label][""] / counted[label].total())[:_MOST_BARS]
+        refused = [label for label in most if counted[label][""] < counted[label].total()] or most
+        left_out += len(most) - len(refused)
+        counted = {label: of for label, of in counted.items() if label in refused}
     totals: Counter[str] = sum(counted.values(), Counter())
     reasons = [reason for reason, _ in totals.most_common() if reason][:_MOST_REASONS]
     layout = panels([[""]], "share of the frames", [""], height=40 * len(counted) + 60)
@@ -132,7 +139,7 @@ def coverage(run: Run) -> tuple[list[Json], Json] | None:
     traces = [_bar(counted, "localized", [""], "single")]
     traces += [_bar(counted, reason, [reason], shade) for reason, shade in zip(reasons, shades, strict=False)]
     rest = [reason for reason in totals if reason and reason not in reasons]
-    return traces + ([_bar(counted, "other reasons", rest, "line")] if rest else []), layout
+    return traces + ([_bar(counted, "other reasons", rest, "line")] if rest else []), layout, left_out
 
 
 def _bar(counted: Mapping[str, Counter[str]], name: str, reasons: Sequence[str], shade: str) -> Json:

@@ -10,6 +10,11 @@ def rig_words(rig: str) -> str:
     return _RIGS.get(rig, rig)
 
 
+def um(millimetres: float) -> str:
+    """A length in micrometres, to three digits."""
+    return f"{float(f'{1e3 * millimetres:.3g}'):,.15g} um"
+
+
 def share(part: float, whole: float) -> str:
     """A share in percent, such as "3.4 %"."""
     return f"{100.0 * part / whole:.3g} %" if whole else "–"
