@@ -41,7 +41,7 @@ def paths(run: Run) -> list[Path]:
 
 
 def space(traces: list[Json]) -> Json:
-    """The layout of a path in space: the same scale along all axes, none of them shorter than a third of the longest."""
+    """The layout of a path in space: one scale along all axes, none of them shorter than a third of the longest."""
     ranges = {axis: _ends([x for trace in traces for x in trace[axis] if x is not None]) for axis in "xyz"}
     longest = max(high - low for low, high in ranges.values())
     axes, lengths = {}, {}
