@@ -29,8 +29,17 @@ class QuickLight:
 
     value: Array  #: irradiance for unit on-axis intensity `[N]` [1/mm^2]
     rows: Array  #: its derivatives by the pose, and by the variance of the lens' blur [mm^2] `[6, N]`
-    offset: Array  #: of the bins from the outline, positive outside `[N]` [bins]
     width: float  #: standard deviation of what spreads the image beside the pixels, in the mean [bins]
+    cosine: Array  #: of the angle between the bins' rays and the axis `[N]`
+    slopes: Array  #: square of its gradient over the image `[N]` [1/bin^2]
+
+    def offset(self, half_angle: float) -> Array:
+        """Distance of the bins from the outline, positive outside `[N]` [bins], as `outline.distances` has it."""
+        sine = np.sqrt(np.maximum(1.0 - np.square(self.cosine), 0.0))
+        # the cosine's gradient is the angle's times the sine, and on the axis itself both are nought
+        steepest = float(self.slopes.max())
+        over = sine / np.sqrt(np.maximum(self.slopes, 1e-9 * steepest))
+        return np.asarray((np.arctan2(sine, self.cosine) - half_angle) * over)
 
 
 class QuickBeam:
@@ -82,10 +91,7 @@ class QuickBeam:
         for row, vector in enumerate(rotation_basis(pose.axis)[:2], start=3):
             rows[row] = slope * (_cross(vector, pose.axis) @ to)
         rows[5] = 0.5 * f * curve * blurs * np.square(stretch)
-        edge = math.cos(profile.half_angle)
-        off = edge - cosine  # the angle off the axis beyond the half angle, to second order
-        offset = off * (1.0 - 0.5 * off * edge / (1.0 - edge**2)) / np.sqrt(slopes * (1.0 - edge**2))
-        return QuickLight(mean * f + mixed, rows, offset, math.sqrt(float(np.mean(spread / slopes))))
+        return QuickLight(mean * f + mixed, rows, math.sqrt(float(np.mean(spread / slopes))), cosine, slopes)
 
     def _by_tip(self, axis: Array, across: Array, to: Array) -> Array | None:
         """The cosine's gradient over a tip that moves `[3, N]` while the needle goes on through the RCM."""
