@@ -8,6 +8,7 @@ from conespot.localize.model.sight import look, window
 from conespot.scene import Pose, Scene
 from conespot.scene.beam import CyclesBeam
 from conespot.scene.camera import Camera
+from conespot.scene.emva import Emva
 from conespot.scene.lens import Lens
 from conespot.scene.motion import Tremor
 from conespot.scene.point_spread import GaussianSpread
@@ -22,13 +23,23 @@ class MovingNeedle:
     """A tip on a slow line with a tremor on it, filmed at 120 Hz with an exposure of 5 ms over an even retina.
 
     The scene tells of the tremor's exposure; one of 0 s is sharp, and nothing to tell. `like_theatre` has the core and
-    the blur of `preset: theatre` as well.
+    the blur of `preset: theatre` as well. `emva` is a camera that says what noise it has; else it has `noise` [white],
+    and says none.
     """
 
     rate_hz = 120.0
 
     def __init__(
-        self, resolution=300, *, seed=1, noise=0.003, exposure_s=0.005, like_theatre=False, blur_mm=0.0, rig="single"
+        self,
+        resolution=300,
+        *,
+        seed=1,
+        noise=0.003,
+        exposure_s=0.005,
+        like_theatre=False,
+        blur_mm=0.0,
+        rig="single",
+        emva=False,
     ):
         blur_mm = 0.0057 if like_theatre else blur_mm
         lens = Lens(blur=GaussianSpread(sigma=blur_mm)) if blur_mm else None
@@ -36,13 +47,16 @@ class MovingNeedle:
             camera=Camera(resolution=resolution, lens=lens),
             beam=CyclesBeam(source_diameter=0.1 if like_theatre else 0.0),
             spotlights=RIGS[rig],
-            sensor=Linear(white=1.0, bits=12),
-            motion=Tremor(rms=0.18, exposure=exposure_s) if exposure_s else None,
+            sensor=Emva(exposure_time=exposure_s or 0.001) if emva else Linear(white=1.0, bits=12),
+            motion=Tremor(rms=0.18, exposure=None if emva else exposure_s) if exposure_s else None,
         )
         self.exposure_s = exposure_s
         self._rng = np.random.default_rng(seed)
         # planes that are shifted at random: new ones for each frame take longer than all else
-        self._noise = [self._rng.normal(0.0, noise, (resolution, resolution)) for _ in range(8)]
+        spread = 1.0 if emva else noise
+        self._noise = [self._rng.normal(0.0, spread, (resolution, resolution)) for _ in range(8)]
+        self._black = self.scene.sensor.black_level / 4095.0 if emva else 0.0
+        self._emva = emva
         self._seed = seed
         self._tremor = Tremor(rms=0.18)
         self._pixels = window(0, 0, resolution, resolution)
@@ -70,7 +84,10 @@ class MovingNeedle:
                 signal[at] += np.nan_to_num(shone.value) * 3.0 / len(parts)
         size = self.scene.camera.resolution
         which, down, right = self._rng.integers(0, [len(self._noise), size, size])
-        noisy = signal.reshape(size, size) + np.roll(self._noise[which], (down, right), (0, 1))
+        noise = np.roll(self._noise[which], (down, right), (0, 1))
+        if self._emva:
+            noise *= np.sqrt(self.scene.sensor.noise.variance(signal)).reshape(size, size)
+        noisy = signal.reshape(size, size) + noise + self._black
         return np.clip(np.rint(4095.0 * noisy), 0, 4095).astype(np.uint16)
 
     def _reached(self, pose):
