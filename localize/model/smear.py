@@ -51,9 +51,15 @@ def smear_sigma(scene: Scene) -> float:
 
 def with_way(scene: Scene, entry: tuple[int, int], new: float) -> Scene:
     """The scene, which has a tremor, with another entry of its way's covariance [mm^2]."""
+    way = way_covariance(scene)
+    way[entry] = way[entry[::-1]] = new
+    return smeared(scene, way)
+
+
+def smeared(scene: Scene, way: Array) -> Scene:
+    """The scene, which has a tremor, with a way of covariance `[3, 3]` [mm^2]."""
     tremor = scene.motion
     assert isinstance(tremor, Tremor)
-    way = way_covariance(scene)
-    values = tuple(new if each == entry else float(way[each]) for each in ENTRIES)
     told = {name: getattr(tremor, name) for name in Tremor.model_fields}
+    values = tuple(float(way[entry]) for entry in ENTRIES)
     return scene.model_copy(update={"motion": Smeared(**told, way=values)})

@@ -22,11 +22,12 @@ from conespot.localize.edge.sandwich import EdgeFit
 from conespot.localize.image import Frame, Reference, linear_light
 from conespot.localize.model.estimate import Estimate
 from conespot.localize.model.knowns import Knowns
+from conespot.localize.model.smear import smeared
 from conespot.localize.model.view import edge_width, outline
 from conespot.localize.outcome import Localization, LocalizationFailure, Outcome
 from conespot.localize.photometric import patch_outcome
 from conespot.localize.verdict import VERDICT, judged
-from conespot.scene.motion import Tremor, Velocity, exposure_of
+from conespot.scene.motion import Tremor, exposure_of
 from conespot.scene.pose import Pose
 from conespot.scene.scene import Scene
 
@@ -63,17 +64,18 @@ class Follower:
         # how far a tremor goes in a frame, which each frame alone has to find, the track tells
         self._told = replace(knowns, smear_sigma_mm=0.0)
         self._can_follow = not self._photometric and reference is None and can_follow(scene, self._told)
-        self._exposure = exposure_of(scene.motion, scene.sensor) if isinstance(scene.motion, Tremor) else 0.0
+        #: that smears [s]; 0 where frames are sharp
+        self.exposure_s = exposure_of(scene.motion, scene.sensor) if isinstance(scene.motion, Tremor) else 0.0
         self._carried: Carried | None = None
         self._misfit = math.inf
         self._asked_at = self._measured_at = -math.inf
 
-    def quick(self, frame: Frame, start: Estimate, velocity: Array, time_s: float) -> Outcome:
-        """The quick fit's answer, the tip moving at `velocity` `[3]` [mm/s]."""
+    def quick(self, frame: Frame, start: Estimate, way: Array, time_s: float) -> Outcome:
+        """The quick fit's answer, the tip's places during the exposure having the covariance `way` `[3, 3]` [mm^2]."""
         if self._carried is None or time_s - self._asked_at > FOLLOWER.scene_s:
             return LocalizationFailure("nothing is carried over")
         renew = time_s - self._measured_at > FOLLOWER.sandwich_s
-        near = Estimate(start.pose, self._moving(velocity))
+        near = Estimate(start.pose, smeared(self._scene, way) if self.exposure_s else self._scene)
         fit = fit_again(frame, near, self._told, self._carried, noise_of(frame, None), renew=renew)
         if fit is None or fit.contrast < FOLLOWER.contrast:
             return LocalizationFailure("the quick fit does not settle")
@@ -114,14 +116,6 @@ class Follower:
         if isinstance(fit, BandFit):
             self._carried, self._misfit = Carried.after(fit, edge_width(fit.estimate)), fit.misfit
             self._asked_at = self._measured_at = time_s
-
-    def _moving(self, velocity: Array) -> Scene:
-        if not self._exposure:
-            return self._scene
-        x, y, z = velocity.tolist()
-        exposure = None if self._scene.sensor.exposure_time else self._exposure
-        motion = Velocity(velocity=(x, y, z), exposure=exposure)
-        return self._scene.model_copy(update={"motion": motion})
 
 
 def _shines(frame: Frame, at: Estimate) -> bool:

@@ -103,10 +103,14 @@ class Belief:
     def _innovation(self, noise: Array) -> Array:
         return np.asarray(OBSERVED @ self.covariance @ OBSERVED.T + noise)
 
-    @property
-    def velocity(self) -> Array:
-        """Of the tip `[3]` [mm/s], tremor and all."""
-        return np.asarray(RATES @ self.mean)
+    def way(self, exposure_s: float) -> Array:
+        """Covariance of the tip's places during an exposure `[3, 3]` [mm^2], tremor and all.
+
+        A velocity that is known in part is less in the mean than the needle's: what is not known of it counts as well.
+        """
+        velocity = RATES @ self.mean
+        square = np.outer(velocity, velocity) + RATES @ self.covariance @ RATES.T
+        return np.asarray(square * exposure_s**2 / 12.0)
 
     def pose(self, scene: Scene) -> Pose:
         """The pose that is believed."""

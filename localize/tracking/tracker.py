@@ -144,7 +144,7 @@ class Tracker:
         start = Estimate(Pose(pose.apex, pose.axis, self._roll), self.scene)
         if self.scene.depth(start.pose.apex) <= 0.0:
             return LocalizationFailure("the motion leads out of the eye")
-        outcome = self._follower.quick(frame, start, before.velocity, self._at)
+        outcome = self._follower.quick(frame, start, before.way(self._follower.exposure_s), self._at)
         if self._goes_on(outcome, before):
             return outcome
         outcome = self._follower.full(frame, start, self._at)

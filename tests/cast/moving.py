@@ -50,6 +50,8 @@ class MovingNeedle:
             sensor=Emva(exposure_time=exposure_s or 0.001) if emva else Linear(white=1.0, bits=12),
             motion=Tremor(rms=0.18, exposure=None if emva else exposure_s) if exposure_s else None,
         )
+        # what lights an instant is not smeared: the mean of a tremor is in a scene that has one
+        self._still = self.scene.model_copy(update={"motion": None})
         self.exposure_s = exposure_s
         self._rng = np.random.default_rng(seed)
         # planes that are shifted at random: new ones for each frame take longer than all else
@@ -80,7 +82,7 @@ class MovingNeedle:
                 size = self.scene.camera.resolution
                 at = (np.arange(size * size).reshape(size, size)[rows, columns]).ravel()
                 sight = self._sight.part(at)
-                shone = light(sight, pose, self.scene, Profile.of(self.scene.beam))
+                shone = light(sight, pose, self._still, Profile.of(self.scene.beam))
                 signal[at] += np.nan_to_num(shone.value) * 3.0 / len(parts)
         size = self.scene.camera.resolution
         which, down, right = self._rng.integers(0, [len(self._noise), size, size])

@@ -14,6 +14,7 @@ from conespot.localize.image import Frame
 from conespot.localize.model.estimate import Estimate
 from conespot.localize.model.forward import light
 from conespot.localize.model.knowns import Knowns
+from conespot.localize.model.outline import distances
 from conespot.localize.model.sight import look, window
 from conespot.localize.model.view import edge_width
 from conespot.scene import Pose
@@ -59,6 +60,17 @@ def test_the_quick_light_is_the_models_within_a_thousandth_and_so_are_its_deriva
     np.testing.assert_allclose(
         (wider.value - found.value) / step, found.rows[5], atol=0.01 * np.abs(found.rows[5]).max()
     )
+
+
+def test_bins_lie_as_far_from_the_quick_outline_as_from_the_exact_one(needle):
+    scene = needle.scene
+    estimate = Estimate(Pose.through(needle.tip(0.0), scene.instrument.rcm), scene)
+    middle = scene.camera.project(scene.outline(estimate.pose, 0)).mean(axis=0).astype(int)
+    pixels = window(middle[1] - 20, middle[0] - 20, 40, 40)
+    sight = look(scene, pixels)
+    exact = distances(pixels, np.zeros(len(pixels), int), estimate)[0]
+    found = QuickBeam(sight, estimate)(estimate.pose).offset(scene.beam.half_angle)
+    np.testing.assert_allclose(found, exact, atol=1e-6)
 
 
 def test_it_answers_as_the_fit_of_all_levels_does_within_a_sigma(needle, carried):
