@@ -13,6 +13,7 @@ from typing import Any
 import matplotlib as mpl
 from matplotlib.axes import Axes
 from matplotlib.axis import Axis
+from matplotlib.backend_bases import RendererBase
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.backends.backend_pdf import FigureCanvasPdf
 from matplotlib.backends.backend_svg import FigureCanvasSVG
@@ -89,12 +90,13 @@ def save(figure: Figure, stem: Path) -> list[Path]:
     written = dict(zip(KINDS, (io.BytesIO() for _ in KINDS), strict=True))
     figure.set_dpi(_DPI)
     canvas = FigureCanvasAgg(figure)
+    renderer = canvas.get_renderer()  # type: ignore[no-untyped-call]
     layout = figure.get_layout_engine()
     if layout is not None:  # once: it costs as much as drawing, and all files then agree
         layout.execute(figure)
         figure.set_layout_engine("none")
         for axes in figure.axes:
-            _pin_labels(axes)
+            _pin_labels(axes, renderer)
     options = {"compress_level": _PNG_LEVEL}
     canvas.print_png(written["png"], metadata={"Software": None}, pil_kwargs=options)  # type: ignore[no-untyped-call]
     FigureCanvasSVG(figure).print_svg(written["svg"], metadata=_NO_DATE)  # type: ignore[no-untyped-call]
@@ -104,9 +106,10 @@ def save(figure: Figure, stem: Path) -> list[Path]:
     return files(stem)
 
 
-def _pin_labels(axes: Axes) -> None:
+def _pin_labels(axes: Axes, renderer: RendererBase) -> None:
     """Leave the axes' labels where the layout put them: each file would look for their places again, by all ticks."""
     for axis in (axes.xaxis, axes.yaxis):
+        axis.get_tightbbox(renderer)  # the layout's last step moves axes from under their labels
         place = axis.label.get_transform().transform(axis.label.get_position())
         axis.set_label_coords(*axes.transAxes.inverted().transform(place))
 
