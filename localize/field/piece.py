@@ -109,9 +109,9 @@ class Piece:
         self._lit = full > 0.0
         brightness = incident_light(bins.ambient.reshape(shape), gain * full)
         model = np.exp(plane.template + self._albedo) * brightness
-        residual, bound = log_residuals(plane, model)
-        use = self._usable | (bound & self._seen)
         sensor = self._noise.variance(model) / bins.at.side**2 / np.square(np.maximum(model, 1e-9))
+        residual, bound = log_residuals(plane, model, sensor)
+        use = self._usable | (bound & self._seen)
         sensor = sensor + plane.template_variance
         local = np.full(shape, self.roughness.scatter**2)
         if not self._fresh:

@@ -14,8 +14,9 @@ from conespot.localize.field.roughness import Roughness
 from conespot.localize.field.sandwich import rest_scatter
 from conespot.localize.model.forward import ambient_irradiance, light
 from conespot.localize.model.profile import Profile
-from conespot.localize.model.residual import censored, incident_light
+from conespot.localize.model.residual import censored, incident_light, log_residuals
 from conespot.localize.model.sight import look, window
+from conespot.localize.model.view import Shown
 from conespot.localize.theory.bounds import patch_pixels
 from conespot.scene.beam import CyclesBeam, HardBeam
 
@@ -84,6 +85,16 @@ def test_a_model_that_takes_off_more_light_than_there_is_has_none():
     light = incident_light(ambient, spotlights)
     np.testing.assert_array_equal(light[:2], (ambient + spotlights)[:2])
     assert np.isnan(light[2])
+
+
+@pytest.mark.parametrize("over_noise", [0.3, 1.0, 3.0, 30.0])
+def test_a_surrounding_darker_than_the_noise_has_residuals_of_mean_nought(over_noise):
+    rng, model, none = np.random.default_rng(4), np.full((400, 500), 0.01), np.zeros((400, 500))
+    sigma = 0.01 / over_noise
+    signal = model + sigma * rng.standard_normal(model.shape)
+    shown = Shown(signal, none == 0.0, none > 0.0, none, none)
+    residual, _ = log_residuals(shown, model, none + over_noise**-2)
+    assert abs(residual.mean()) < 4.0 * residual.std() / math.sqrt(residual.size)
 
 
 @lru_cache
