@@ -17,7 +17,7 @@ from dataclasses import dataclass, fields, is_dataclass
 import cv2
 import numpy as np
 
-from conespot.localize import Knowns, Localization, Reference, SensorNoise, locate
+from conespot.localize import Knowns, Localization, Reference, SensorNoise, doubt, locate
 from conespot.localize.edge.settings import EDGE
 from conespot.localize.field.settings import FIELD
 from conespot.localize.image import Frame
@@ -200,8 +200,7 @@ def told(which: list[Case], before: list[Outcome], after: list[Outcome]) -> str:
 def main(wanted: list[str]) -> None:
     """Go through the numbers."""
     cv2.setNumThreads(1)
-    for module in ("cone", "photometric"):
-        sys.modules[f"conespot.localize.{module}"].find_starts = remembered
+    doubt.find_starts = remembered
     every = list(cases())
     groups = {group: [case for case in every if case.group == group] for group in dict.fromkeys(c.group for c in every)}
     usual = {group: [case.answer() for case in members] for group, members in groups.items()}

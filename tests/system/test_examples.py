@@ -76,7 +76,12 @@ def test_every_example_works_after_those_before_it(shell, tmp_path, monkeypatch,
 
 def test_bash_completes_commands_options_and_shipped_campaigns(shell):
     assert shell("campaign completion bash > conespot.bash").returncode == 0
-    for words, wanted in (("pre", "preview"), ("run --po", "--poses"), ("plan power", "power_sweep")):
+    for words, wanted in (
+        ("pre", "preview"),
+        ("run --po", "--poses"),
+        ("plan power", "power_sweep"),
+        ("theory theatre-i", "theatre-ideal"),
+    ):
         line = (
             f"source conespot.bash; COMP_WORDS=(campaign {words}); COMP_CWORD=$((${{#COMP_WORDS[@]}} - 1));"
             '_shtab_campaign campaign "${COMP_WORDS[COMP_CWORD]}"; printf "%s\\n" "${COMPREPLY[@]}"'
