@@ -57,13 +57,16 @@ def compressed(pixels: AnyImage, rows: slice, columns: slice) -> bool:
 def agreement(frequencies: Array) -> float:
     """How well blocks' frequencies `[N, 8, 8]` agree with the multiples of the best quality's steps [sigmas]."""
     best = 0.0
+    speaking = np.abs(frequencies) > COMPRESSION.rounded_away * COMPRESSION.least_step  # at any quality
+    speaking[:, 0, 0] = False
+    _, row, column = np.nonzero(speaking)
+    found = frequencies[speaking]
     for quality in COMPRESSION.qualities:
-        steps = luminance_steps(quality).astype(float)
-        told = (steps >= COMPRESSION.least_step) & (np.abs(frequencies) > COMPRESSION.rounded_away * steps)
-        told[:, 0, 0] = False
+        steps = luminance_steps(quality).astype(float)[row, column]
+        told = (steps >= COMPRESSION.least_step) & (np.abs(found) > COMPRESSION.rounded_away * steps)
         count = int(np.count_nonzero(told))
         if count >= COMPRESSION.fewest:
-            phases = (frequencies / steps)[told]
+            phases = found[told] / steps[told]
             best = max(best, float(np.sum(np.cos(2.0 * np.pi * phases))) / float(np.sqrt(count / 2.0)))
     return best
 
