@@ -5,6 +5,7 @@ Files may come from strangers: only plain data is read (no tags, no anchors), an
 
 from __future__ import annotations
 
+import copy
 import difflib
 import functools
 import os
@@ -32,6 +33,8 @@ _MAX_NODES = 12_000
 _MAX_DEPTH = 32
 _MAX_BITS = 1024
 _LONGEST = 1000
+#: texts whose values are kept: a command reads its campaign and its presets again and again
+_KEPT = 32
 #: keys that another key stands for: a camera's calibration file, and the eye of a population whose shape a surface has
 _STOOD_FOR = {
     "calibration": ("resolution", "focal_length", "pixel_aspect", "principal_point", "distortion"),
@@ -131,6 +134,13 @@ class _NotPlainError(Exception):
 
 
 def _load(text: str, source: str) -> tuple[Any, dict[Path_, str]]:
+    """The value that a text holds and where each part of it stands, for the caller to change."""
+    data, lines = _parsed(text, source)
+    return copy.deepcopy(data), dict(lines)
+
+
+@functools.lru_cache(maxsize=_KEPT)
+def _parsed(text: str, source: str) -> tuple[Any, dict[Path_, str]]:
     yaml = YAML(typ="safe", pure=True)
     yaml.Composer = _Composer
     lines: dict[Path_, str] = {}

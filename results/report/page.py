@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import base64
+import functools
 import hashlib
 import importlib.util
 from collections.abc import Sequence
@@ -86,22 +87,39 @@ def make_report(run: Run, tables: Sequence[Table], drawings: Sequence[Drawing], 
 
 def fill(template: str, **content: Any) -> bytes:
     """A template of this folder as a page with style and scripts in it, and a policy that lets nothing else run."""
-    environment = jinja2.Environment(
+    scripts = _scripts()
+    page = (
+        _environment()
+        .get_template(template)
+        .render(
+            style=Markup((resources.files("conespot.results.report") / "style.css").read_text("utf-8")),
+            scripts=list(scripts),
+            allowed=" ".join(f"'sha256-{hashed}'" for hashed in scripts.values()),
+            **content,
+        )
+    )
+    return page.encode()
+
+
+@functools.cache
+def _environment() -> jinja2.Environment:
+    return jinja2.Environment(
         loader=jinja2.PackageLoader("conespot.results.report", "."),
         autoescape=True,
         undefined=jinja2.StrictUndefined,
         trim_blocks=True,
         lstrip_blocks=True,
     )
+
+
+@functools.cache
+def _scripts() -> dict[Markup, str]:
+    """The page's scripts and their digests, as its policy names them. Raises InputError."""
     here = resources.files("conespot.results.report")
-    scripts = [_plotly(), (here / "script.js").read_text("utf-8")]
-    page = environment.get_template(template).render(
-        style=Markup((here / "style.css").read_text("utf-8")),
-        scripts=[Markup(script) for script in scripts],
-        allowed=" ".join(f"'sha256-{_hash(script)}'" for script in scripts),
-        **content,
-    )
-    return page.encode()
+    return {
+        Markup(script): base64.b64encode(hashlib.sha256(script.encode()).digest()).decode("ascii")
+        for script in (_plotly(), (here / "script.js").read_text("utf-8"))
+    }
 
 
 def _plotly() -> str:
@@ -111,10 +129,6 @@ def _plotly() -> str:
     if not path.is_file():
         raise InputError("the report needs the package plotly, which is not installed whole: pip install plotly")
     return path.read_text("utf-8")
-
-
-def _hash(script: str) -> str:
-    return base64.b64encode(hashlib.sha256(script.encode()).digest()).decode("ascii")
 
 
 def _inlined(path: Path) -> str:
