@@ -13,6 +13,7 @@ Array = NDArray[np.float64]
 #: reasons of more than one stage; a reason is counted by its text, so it carries no numbers
 COVERED: Final = "too little of the patch is in the frame"
 UNCERTAIN: Final = "too uncertain: the patch and what is known do not hold the tip within the limit"
+FEW_PIXELS: Final = "the patch is too few pixels wide: a tip so near the wall needs a camera that resolves more"
 OUTSIDE: Final = "the tip would be outside the eye"
 #: reasons of the frame itself
 COMPRESSED: Final = "the frame went through JPEG, of which the scene's sensor says nothing: state a recorded one"

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -11,13 +12,14 @@ from conespot.localize.edge.band import BandFit, Stage, fit_band
 from conespot.localize.edge.sandwich import EdgeFit
 from conespot.localize.edge.saturated import SaturatedFit, fit_saturated
 from conespot.localize.edge.settings import EDGE, Level
+from conespot.localize.edge.strips import WIDTH
 from conespot.localize.image import Frame, Reference
 from conespot.localize.model.estimate import Estimate
 from conespot.localize.model.knowns import Knowns
 from conespot.localize.model.noise import NoiseModel, SensorNoise
 from conespot.localize.model.profile import Profile
 from conespot.localize.model.view import edge_width, outlines
-from conespot.localize.outcome import COVERED, UNCERTAIN, LocalizationFailure
+from conespot.localize.outcome import COVERED, FEW_PIXELS, UNCERTAIN, LocalizationFailure
 from conespot.scene.scene import Scene
 
 Array = NDArray[np.float64]
@@ -79,12 +81,15 @@ def fit_edge(
     patch = _Patch.of(frame, start, points)
     if not (patch.sharp and patch.clipped > EDGE.throughout):
         return _bands(frame, start, knowns, noise, reference, patch)
+    if patch.size < EDGE.narrowest:
+        return LocalizationFailure(FEW_PIXELS)
     found: list[EdgeFit | LocalizationFailure] = [
         _throughout(replace(frame, ringing=EDGE.ringing), start, knowns, patch.size)
     ]
     # What a compression leaves of so high an edge is nothing to measure. Nor can its few pixels that are neither dark
     # nor clipped be weighed where nobody states the camera's noise: through optics tips were 14 um off at a stated 3.
-    if _states(noise) and not frame.sensor.noise.compression > 0.0:
+    few = math.pi * patch.size / WIDTH < EDGE.fewest_strips
+    if _states(noise) and not frame.sensor.noise.compression > 0.0 and not few:
         found.append(_bands(frame, start, knowns, noise, reference, patch))
     # the brighter the light, the fewer pixels of the edge are neither dark nor clipped: then bands hold the tip less
     held = [fit for fit in found if isinstance(fit, EdgeFit) and fit.settled]

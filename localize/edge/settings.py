@@ -53,6 +53,13 @@ class EdgeSettings:
     #: a step this short [sigmas of uncorrelated residuals] ends a level that others follow, and the last one: what is
     #: left is below the noise. Not critical
     enough: tuple[float, float] = (1.0, 0.3)
+    #: width of a patch that is clipped throughout, below which its outline is a matter of whole pixels [px]: of
+    #: near_retina's ideal frames those 4 to 9 px wide were 0 to 6 sigmas off, wider ones 2 at most
+    narrowest: float = 10.0
+    #: strips of pixels around a patch that is clipped throughout, without which its few pixels that are neither dark
+    #: nor clipped do not say how well they hold the tip: of near_retina's ideal frames with 25 to 34 strips bands held
+    #: less than half of their 95 % intervals, and were up to 10 sigmas off
+    fewest_strips: int = 64
     #: bins without which a band is too short: eight for each parameter. No answer changes
     fewest_bins: int = 40
     #: share of the light in a band below which a bin counts as unlit, where a blur has no end

@@ -37,9 +37,9 @@ class Overview:
     floor: float  #: added before the logarithm, so that noise in the dark and dark vessels count little [white]
 
     @classmethod
-    def of(cls, frame: Frame, reference: Reference | None) -> Overview:
-        """The overview of a frame."""
-        step = max(1, frame.side // START.overview_px)
+    def of(cls, frame: Frame, reference: Reference | None, *, whole: bool = False) -> Overview:
+        """The overview of a frame; of the `whole` frame every pixel."""
+        step = 1 if whole else max(1, frame.side // START.overview_px)
         light = _one_channel(frame, step)
         noise = spread(np.diff(light[::3, ::2], axis=1)) / math.sqrt(2.0)
         floor = max(START.dark_share * float(np.median(light[::3, ::3])), START.noise_sigmas * noise, _DARKEST)
@@ -112,6 +112,31 @@ def find_rings(
             if 1.0 / START.one_ring_size < radius / radii[k] < START.one_ring_size:
                 votes[j][away < (START.one_ring_place * max(radius, radii[k])) ** 2] = -1.0
     return found
+
+
+def find_spots(overview: Overview, scene: Scene, most: int) -> list[Ring]:
+    """The `most` round spots too small for rings to see, those that stand out most first.
+
+    Maxima of the scale-normalised Laplacian of the log light, which a disc of radius r has at a blur of r / sqrt(2)
+    (T. Lindeberg, Feature detection with automatic scale selection, Int. J. Computer Vision 30, 1998).
+    """
+    log = cv2.medianBlur(overview.logarithm(overview.light, overview.reference), 3)  # without hot pixels
+    high = START.smallest * START.fine_bin_side * max(1, max(log.shape) // START.overview_px)
+    radii = np.geomspace(START.tiniest, high, max(2, round(math.log(high / START.tiniest, START.spot_ratio)) + 1))
+    found: list[Ring] = []
+    for radius in radii:
+        sigma = radius / math.sqrt(2.0)
+        spot = -(sigma**2) * cv2.Laplacian(cv2.GaussianBlur(log, (0, 0), sigma), cv2.CV_32F, ksize=1)
+        peaks = np.argwhere((spot == cv2.dilate(spot, np.ones((3, 3), np.uint8))) & (spot > START.half_vote))
+        values = spot[peaks[:, 0], peaks[:, 1]]
+        for at in np.argsort(-values)[:most]:
+            row, column = peaks[at]
+            found.append(Ring(overview.step * (np.array([column, row]) + 0.5), overview.step * radius, values[at]))
+    kept: list[Ring] = []
+    for ring in sorted(found, key=lambda each: -each.votes):
+        if all(np.linalg.norm(ring.centre - other.centre) > max(ring.radius, other.radius) for other in kept):
+            kept.append(ring)
+    return kept[:most]
 
 
 def _summit(votes: NDArray[np.float32], peak: tuple[int, int, int], axis: int) -> float:

@@ -23,7 +23,7 @@ from conespot.localize.model.residual import spread
 from conespot.localize.outcome import Localization, LocalizationFailure, Outcome
 from conespot.localize.start.rays import rays_across, support
 from conespot.localize.start.rig import poses_on
-from conespot.localize.start.rings import Overview, Ring, find_rings
+from conespot.localize.start.rings import Overview, Ring, find_rings, find_spots
 from conespot.localize.start.settings import START
 from conespot.scene.pose import Pose, tangents
 from conespot.scene.scene import Scene
@@ -42,6 +42,7 @@ class Start:
     explained: float  #: share of the log light's gradients across the outlines that the cones explain, 0 to 1
     clearest: float  #: share that a quarter of the rays across the outlines exceed
     evidence: float  #: their sum along a ray, what it adds to the log-likelihood
+    grain: float = 0.0  #: pixel of what was looked at, below which nothing is said of where outlines are [px]
 
     @property
     def stands_out(self) -> bool:
@@ -49,9 +50,9 @@ class Start:
         return self.clearest > START.clear and self.explained > START.least_share and self.evidence > START.faintest
 
     def near(self, pose: Pose, scene: Scene, share: float) -> bool:
-        """Whether the outlines of `pose` are within a `share` of their radius of where the start found them."""
+        """Whether the outlines of `pose` are within a `share` of their radius, or a grain, of where the start is."""
         return all(
-            float(np.linalg.norm(mine[0] - other[0])) + abs(mine[1] - other[1]) < share * mine[1]
+            float(np.linalg.norm(mine[0] - other[0])) + abs(mine[1] - other[1]) < max(share * mine[1], self.grain)
             for mine, other in zip(_circles(self.pose, scene), _circles(pose, scene), strict=True)
         )
 
@@ -99,8 +100,28 @@ def find_starts(frame: Frame, scene: Scene, reference: Reference | None = None) 
         if start.evidence >= share * found[0].evidence and start.stands_out:
             given.append(start)
             yield start
-    if given and not several:
+    if several:
+        return
+    if given:
         yield from _instruments(overview, scene, rings, given)
+    else:
+        yield from _near_the_wall(Overview.of(frame, reference, whole=True), scene)
+
+
+def _near_the_wall(whole: Overview, scene: Scene) -> Iterator[Start]:
+    """The start on the one spot that is too small for rings: the patch of a tip close to the wall."""
+    spots = find_spots(whole, scene, 2)
+    if (
+        not spots
+        or spots[0].votes < START.spot
+        or any(other.votes > START.only * spots[0].votes for other in spots[1:])
+    ):
+        return
+    for pose in poses_on(spots[:1], scene):
+        seen = rays_across(whole, scene, pose, thorough=True)
+        if seen:
+            # a ring of a few pixels is as good as its rays
+            yield Start(pose, *support(seen), grain=max(1.0, (START.spot_ratio - 1.0) * spots[0].radius))
 
 
 def _instruments(overview: Overview, scene: Scene, rings: Sequence[Ring], given: Sequence[Start]) -> Iterator[Start]:
@@ -206,7 +227,7 @@ def _settle(overview: Overview, scene: Scene, pose: Pose, *, thorough: bool) -> 
         points, worth = (np.concatenate(parts) for parts in zip(*(rays.found() for rays in seen), strict=True))
         # a spotlight of which the frame shows nothing where it should be denies the whole pose
         lit = min(support([rays])[0] for rays in seen) > START.dark
-        here = Start(estimate.pose, *support(seen)) if lit else None
+        here = Start(estimate.pose, *support(seen), grain=overview.step) if lit else None
         if turn == START.turns:
             return here
         spots = np.concatenate([np.full(len(r.total), r.spotlight, np.intp) for r in seen])

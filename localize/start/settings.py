@@ -46,6 +46,14 @@ class StartSettings:
     #: of the eye away
     nearest: float = 0.7  # half and twice 0
     smallest: float = 1.2  # half and twice 0
+    #: radius of the smallest spot that is looked for in the whole frame [px]: hot pixels and their neighbours are
+    #: smaller; and ratio of neighbouring ones
+    tiniest: float = 2.0
+    spot_ratio: float = 1.4
+    #: log light by which a spot must stand out, and share of it that another one may have: of near_retina's ideal
+    #: frames the patches have 3.4 to 3.9
+    spot: float = 2.0
+    only: float = 0.7
     #: how wide the gradients along a ring that was found are taken out of the vote [bins]: both sides of a blurred rim
     hidden_width: int = 3  # half and twice 0
     #: rings nearer than this share of the larger radius, and less than this ratio apart in size, are one
