@@ -50,5 +50,5 @@ def judged_edge(fit: EdgeFit, scene: Scene) -> Outcome:
     return judged(
         fit.estimate, fit.covariance, scene, fit.knowns,
         misfit=fit.misfit, covered=fit.covered, settled=fit.settled,
-        suspicions=lambda: fit.suspicions(fit.knowns),
+        suspicions=lambda: fit.suspicions(scene),
     )  # fmt: skip

@@ -36,6 +36,7 @@ from conespot.localize.model.suspicion import scores as score_tests
 from conespot.localize.model.suspicion import watched
 from conespot.localize.outcome import COVERED, UNCERTAIN, LocalizationFailure
 from conespot.scene.beam import CyclesBeam, HardBeam
+from conespot.scene.scene import Scene
 
 Array = NDArray[np.float64]
 
@@ -99,27 +100,29 @@ class BandFit(EdgeFit):
         scores, parts, known = self._strips(self.channels, self.prior)
         return score_covariance(self.channels[0].strips, scores, parts) + known
 
-    def suspicions(self, knowns: Knowns) -> dict[str, float]:
+    def suspicions(self, nominal: Scene) -> dict[str, float]:
         """Scores of beam and wall where the fit stands, over their sigmas."""
+        knowns, pose_size = self.knowns, self.estimate.pose_size
         wide = watched(knowns, self.estimate.scene)
         lights, size = self.seen.lights(self.estimate, wide), len(self.information)
         fixed = [q for q in wide.free if knowns.sigma(q) == 0.0]
-        own = [self.estimate.pose_size + i for i, q in enumerate(wide.free) if q not in fixed]
-        last = [self.estimate.pose_size + i for i, q in enumerate(wide.free) if q in fixed]
-        order, names = [*range(self.estimate.pose_size), *own, *last], [q.name for q in fixed]
+        own = [pose_size + i for i, q in enumerate(wide.free) if q not in fixed]
+        last = [pose_size + i for i, q in enumerate(wide.free) if q in fixed]
+        order, names = [*range(pose_size), *own, *last], [q.name for q in fixed]
         softer = self.seen.softer(self.estimate)
-        channels = []
-        for c, channel in enumerate(self.channels):
-            light, rows = lights[c]
-            rows = rows[order] if softer is None else np.concatenate([rows[order], softer[None]])
-            channels.append(copy(channel))
-            channels[-1].evaluate(self.seen.irradiance, light, rows, lights.odds[c] if lights.odds else None)
         if softer is not None:
             names.append("edge")
-        prior = np.pad(self.prior, ((0, 0), (0, len(names))))
+        also = [] if softer is None else [softer[None]]
+        wider = Lights(tuple((light, np.concatenate([rows[order], *also])) for light, rows in lights.each), lights.odds)
+        channels = [copy(channel) for channel in self.channels]
+        told, prior = prior_rows(self.estimate, nominal, knowns)
+        prior = np.pad(prior, ((0, 0), (0, len(names))))
+        # where a prior pulls, the slope of what bins say is not zero at the minimum: both together are
+        information, gradient, _ = _equations(channels, self.seen.irradiance, wider, (told, prior))
         scores, parts, known = self._strips(channels, prior)
+        follows = float(np.mean([channel.follows for channel in channels]))
         return score_tests(
-            names, scores.sum(axis=0), parts.sum(axis=0) + prior.T @ prior,
+            names, gradient / follows, information,
             score_covariance(self.channels[0].strips, scores, parts) + known, size,
         )  # fmt: skip
 

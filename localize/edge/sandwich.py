@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from conespot.localize.model.estimate import Estimate
 from conespot.localize.model.knowns import Knowns
 from conespot.localize.model.solve import STEP, inverse
+from conespot.scene.scene import Scene
 
 Array = NDArray[np.float64]
 
@@ -38,7 +39,7 @@ class EdgeFit(ABC):
         """Covariance of the gradient `[P, P]` as the residuals show it, priors included."""
 
     @abstractmethod
-    def suspicions(self, knowns: Knowns) -> dict[str, float]:
+    def suspicions(self, nominal: Scene) -> dict[str, float]:
         """Scores of beam and wall where the fit stands, over their sigmas: see `model.suspicion`."""
 
     @cached_property

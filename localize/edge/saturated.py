@@ -24,6 +24,7 @@ from conespot.localize.model.residual import follows, spread, student_weights
 from conespot.localize.model.solve import limited, reduction, solved
 from conespot.localize.model.view import Shown
 from conespot.localize.outcome import COVERED, UNCERTAIN, LocalizationFailure
+from conespot.scene.scene import Scene
 
 Array = NDArray[np.float64]
 
@@ -43,7 +44,7 @@ class SaturatedFit(EdgeFit):
         """The scatter of the strips is their own measure."""
         return 1.0
 
-    def suspicions(self, knowns: Knowns) -> dict[str, float]:
+    def suspicions(self, nominal: Scene) -> dict[str, float]:
         """A blur's alone: which pixels are clipped does not tell of beam and wall.
 
         Light that a lens spreads brings pixels to white that the beam does not reach, by more than their size.

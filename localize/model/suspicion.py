@@ -16,40 +16,70 @@ from numpy.typing import NDArray
 
 from conespot.localize.model.knowns import Knowns
 from conespot.localize.model.solve import reduction
+from conespot.scene.population import SEMI_AXES_SIGMA_MM
 from conespot.scene.scene import Scene
 
 Array = NDArray[np.float64]
 #: share of a quantity's information that pose and free quantities must leave it: rounding alone is in the rest
 _LEFT = 1e-9
-#: what each would have to be off by to count, and could be at most [rad, 1, mm, 1]. Nobody knows a lamp's softness to a
+#: the retina's semi-axes, which are doubted together
+WALL = "wall"
+_SHAPE = ("retina_width", "retina_height", "retina_length")
+#: what each would have to be off by to count, and could be at most [rad, 1, 1]. Nobody knows a lamp's softness to a
 #: hundredth; what would have to be off by more than is possible hardly shows in the frame, and something else is amiss,
 #: such as the foot of a soft edge below the sensor's last level
-_MATERIAL = {"half_angle": (2e-4, 0.05), "softness": (0.01, 1.0), "eye_radius": (0.02, 3.0), "edge": (0.01, 1.0)}
+_MATERIAL = {"half_angle": (2e-4, 0.05), "softness": (0.01, 1.0), "edge": (0.01, 1.0)}
+#: the same of the wall's shape: least change of all semi-axes together [mm], and most sigmas of a population's
+_SHAPE_MATERIAL_MM, _SHAPE_SIGMAS = 0.02, 5.0
 
 
 def watched(knowns: Knowns, scene: Scene) -> Knowns:
     """The same with beam and wall free, so that their derivatives are there, as far as the scene has them.
 
-    The eye's radius stands for the wall and for where the camera is: an image tells them apart only a little.
+    The shape of the wall stands for where the camera is too: an image tells them apart only a little.
     """
     wide = replace(knowns, half_angle_sigma_deg=knowns.half_angle_sigma_deg or None)
     if scene.beam.softness is not None:
         wide = replace(wide, softness_sigma=knowns.softness_sigma or None)
-    return replace(wide, eye_radius_sigma_mm=knowns.eye_radius_sigma_mm or None)
+    return replace(wide, semi_axes_sigma_mm=knowns.semi_axes_sigma_mm or None)
 
 
 def scores(names: list[str], gradient: Array, information: Array, scatter: Array, size: int) -> dict[str, float]:
     """Each of the last parameters' scores over its own sigma, the first `size` taken out; of those that matter.
 
     `gradient` `[P]`, `information` `[P, P]` and the gradient's covariance `scatter` `[P, P]` are where a fit stands.
+    The semi-axes have one score, of the wall.
     """
     order = [*range(size, len(gradient)), *range(size)]
     reduced = reduction(information[np.ix_(order, order)], len(gradient) - size)
-    left = np.diag(reduced @ information[np.ix_(order, order)] @ reduced.T)
-    score, variance = reduced @ gradient[order], np.diag(reduced @ scatter[np.ix_(order, order)] @ reduced.T)
+    left = reduced @ information[np.ix_(order, order)] @ reduced.T
+    score, variance = reduced @ gradient[order], reduced @ scatter[np.ix_(order, order)] @ reduced.T
     whole = np.diag(information)[size:]
-    return {
-        name: float(s) / math.sqrt(float(v))
-        for name, s, v, part, all_of_it in zip(names, score, variance, left, whole, strict=True)
-        if v > 0.0 and part > _LEFT * all_of_it and _MATERIAL[name][0] < abs(s) / part < _MATERIAL[name][1]
-    }
+    found = {}
+    for j, name in enumerate(names):
+        s, v, part = float(score[j]), float(variance[j, j]), float(left[j, j])
+        if name in _SHAPE or not (v > 0.0 and part > _LEFT * whole[j]):
+            continue
+        if _MATERIAL[name][0] < abs(s) / part < _MATERIAL[name][1]:
+            found[name] = s / math.sqrt(v)
+    shape = [j for j, name in enumerate(names) if name in _SHAPE]
+    if shape:
+        at = np.ix_(shape, shape)
+        found[WALL] = _of_wall(score[shape], left[at], variance[at], whole[shape])
+    return found
+
+
+def _of_wall(score: Array, left: Array, variance: Array, whole: Array) -> float:
+    """The score of all semi-axes `[3]` together, as one of one quantity would be; 0 where it does not matter.
+
+    Twice the logarithm of how much likelier a shape out of a population makes the score than the one that was told, but
+    for the prior odds: directions in which a frame does not show the shape then count for nothing.
+    """
+    variance = variance + np.diag(_LEFT * whole)
+    prior = SEMI_AXES_SIGMA_MM**2 * np.eye(len(score))
+    possible = variance + left @ prior @ left
+    told, drawn = (float(score @ np.linalg.solve(v, score)) for v in (variance, possible))
+    step = prior @ left @ np.linalg.solve(possible, score)
+    if float(np.linalg.norm(step)) < _SHAPE_MATERIAL_MM or drawn > _SHAPE_SIGMAS**2:
+        return 0.0
+    return math.sqrt(max(told - drawn, 0.0))

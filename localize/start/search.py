@@ -145,23 +145,37 @@ def _instruments(overview: Overview, scene: Scene, rings: Sequence[Ring], given:
 def believed(starts: Iterable[Start], scene: Scene, localized: Callable[[Start], Outcome]) -> Outcome:
     """The one outcome of the starts that is not refused; if all are, the first refusal."""
     refusal: LocalizationFailure | None = None
-    found: Localization | None = None
+    found: tuple[Start, Localization] | None = None
     for start in starts:
         outcome = localized(start)
         if isinstance(outcome, Localization):
             pose = Pose(outcome.apex_mm, outcome.axis, outcome.roll or 0.0)
             if start.near(pose, scene, START.near):
-                if found is not None and float(np.linalg.norm(found.apex_mm - outcome.apex_mm)) > START.apart_mm:
+                if found is None:
+                    found = start, outcome
+                elif _contradict(found, (start, outcome), scene):
                     return LocalizationFailure(TWO_PLACES)
-                found = outcome if found is None else found
                 continue
             outcome = LocalizationFailure(ELSEWHERE)
         if found is None and refusal is None and start.explained > START.convincing:
             return outcome
         refusal = outcome if refusal is None else refusal
     if found is not None:
-        return found
+        return found[1]
     return LocalizationFailure(NOTHING) if refusal is None else refusal
+
+
+def _contradict(best: tuple[Start, Localization], other: tuple[Start, Localization], scene: Scene) -> bool:
+    """Whether two answers may both be right and are not the same.
+
+    A rig turned into its neighbours' places fits them too, but badly: its residuals leave the tip far less sure.
+    """
+    if float(np.linalg.norm(best[1].apex_mm - other[1].apex_mm)) <= START.apart_mm:
+        return False
+    if len(scene.spotlights) == 1 or not other[0].touches(best[0], scene):
+        return True
+    sure, unsure = (math.sqrt(float(np.trace(np.asarray(found.covariance)[:3, :3]))) for _, found in (best, other))
+    return unsure <= START.less_sure * sure
 
 
 def _rivals(ring: Ring, best: Ring) -> bool:
@@ -250,6 +264,11 @@ def _towards(estimate: Estimate, pixels: Array, spots: NDArray[np.intp], worth: 
     scene, pose = estimate.scene, estimate.pose
     roll = len(scene.spotlights) > 1
     r, jacobian, _ = distances(pixels, spots, estimate)
+    # a ray may see its edge in pixels that look at the iris
+    seen = np.isfinite(r)
+    if np.count_nonzero(seen) < START.fewest_points:
+        return None
+    r, jacobian, worth, sizes = r[seen], jacobian[seen], worth[seen], sizes[seen]
     rcm = np.asarray(scene.instrument.rcm)
     length = float(np.linalg.norm(pose.apex - rcm))
     u, v = tangents(pose.axis)

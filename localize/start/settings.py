@@ -144,6 +144,9 @@ class StartSettings:
     #: starts or answers nearer than this are one [mm, rad]: 0.2 rad is two of the rolls tried
     apart_mm: float = 0.1
     apart_rad: float = 0.2
+    #: how often the best start's sigma of the tip another roll of a rig's must be to be dismissed: the wrong ones of
+    #: three frames of `theatre` with three spotlights have 5 to 9 times
+    less_sure: float = 4.0
     #: share of the gradients that a patch explains where nothing else is bright; a disc may explain nearly as much
     convincing: float = 0.6
     #: share that a quarter of the rays across a ring elsewhere exceed where that may be another spotlight's patch: of
