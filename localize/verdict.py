@@ -113,7 +113,7 @@ def judged(
     }
     worst = max(found, key=lambda name: found[name], default=None)
     if worst is not None and found[worst] > 1.0:
-        return LocalizationFailure(WRONG_WALL if worst == WALL else WRONG_BEAM)
+        return LocalizationFailure(WRONG_WALL if worst in (WALL, "eye_radius") else WRONG_BEAM)
     if not settled:
         return LocalizationFailure(UNSETTLED)
     distance = distance_of(estimate, joint, knowns, joint=True)

@@ -22,13 +22,13 @@ from conespot.scene.scene import Scene
 Array = NDArray[np.float64]
 #: share of a quantity's information that pose and free quantities must leave it: rounding alone is in the rest
 _LEFT = 1e-9
-#: the retina's semi-axes, which are doubted together
+#: the name of the score of the retina's semi-axes, which are doubted together
 WALL = "wall"
 _SHAPE = ("retina_width", "retina_height", "retina_length")
-#: what each would have to be off by to count, and could be at most [rad, 1, 1]. Nobody knows a lamp's softness to a
+#: what each would have to be off by to count, and could be at most [rad, 1, mm, 1]. Nobody knows a lamp's softness to a
 #: hundredth; what would have to be off by more than is possible hardly shows in the frame, and something else is amiss,
 #: such as the foot of a soft edge below the sensor's last level
-_MATERIAL = {"half_angle": (2e-4, 0.05), "softness": (0.01, 1.0), "edge": (0.01, 1.0)}
+_MATERIAL = {"half_angle": (2e-4, 0.05), "softness": (0.01, 1.0), "eye_radius": (0.02, 3.0), "edge": (0.01, 1.0)}
 #: the same of the wall's shape: least change of all semi-axes together [mm], and most sigmas of a population's
 _SHAPE_MATERIAL_MM, _SHAPE_SIGMAS = 0.02, 5.0
 
@@ -36,11 +36,16 @@ _SHAPE_MATERIAL_MM, _SHAPE_SIGMAS = 0.02, 5.0
 def watched(knowns: Knowns, scene: Scene) -> Knowns:
     """The same with beam and wall free, so that their derivatives are there, as far as the scene has them.
 
-    The shape of the wall stands for where the camera is too: an image tells them apart only a little.
+    The wall stands for where the camera is too: an image tells them apart only a little. Of several sharp patches its
+    three semi-axes are doubted; one patch, or soft ones, tell them from the albedo less well (of 90 frames on living
+    retinas whose wall was told rightly three would be refused), and there it is the eye's radius alone.
     """
     wide = replace(knowns, half_angle_sigma_deg=knowns.half_angle_sigma_deg or None)
-    if scene.beam.softness is not None:
+    soft = scene.beam.softness is not None
+    if soft:
         wide = replace(wide, softness_sigma=knowns.softness_sigma or None)
+    if soft or len(scene.spotlights) == 1:
+        return replace(wide, eye_radius_sigma_mm=knowns.eye_radius_sigma_mm or None)
     return replace(wide, semi_axes_sigma_mm=knowns.semi_axes_sigma_mm or None)
 
 
