@@ -54,7 +54,8 @@ class Table:
         """What `shown` leaves out, in a sentence; empty if nothing."""
         blocks = len(self.blocks) - len(self.shown)
         lines = sum(len(block.lines) for block in self.blocks) - sum(len(block.lines) for block in self.shown)
-        return f"{blocks} more blocks ({lines} lines) stand in tables/{self.name}.csv." if lines else ""
+        what = f"{blocks} more blocks ({lines} lines)" if blocks else f"{lines} more lines"
+        return f"{what} stand in tables/{self.name}.csv." if lines else ""
 
     @property
     def shared(self) -> dict[str, str]:
