@@ -12,12 +12,16 @@ from conespot.localize import locate
 from conespot.localize.compression import compressed
 from conespot.localize.doubt import noise_of
 from conespot.localize.image import Frame
+from conespot.localize.model.knowns import Knowns
 from conespot.localize.outcome import COMPRESSED, NO_LIGHT
 from conespot.localize.start.search import TWO_PLACES
 from conespot.localize.verdict import WRONG_BEAM, WRONG_WALL
 from conespot.scene import InputError
 from conespot.scene.beam import CyclesBeam, HardBeam
+from conespot.scene.eye import Eye
+from conespot.scene.population import SEMI_AXES_SIGMA_MM
 from conespot.scene.sensor import Linear, Recorded
+from conespot.scene.surface import Surface
 
 SIDE = 400
 HERE, THERE = (-1.5, -1.5, 3.0), (1.8, 1.6, 3.0)
@@ -107,6 +111,18 @@ def test_a_beam_or_a_wall_told_wrongly_is_refused_with_the_reason_and_the_right_
     assert locate(image, scene, "cone", noise=NOISE)
     assert locate(image, soft, "cone", noise=NOISE).reason == WRONG_BEAM
     assert locate(image, long, "cone", noise=NOISE).reason == WRONG_WALL
+
+
+def test_three_spotlights_notice_that_the_retina_has_another_shape_and_keep_the_right_one():
+    mean = scene_of(HardBeam(), "triple", resolution=300, eye=Eye(radius=10.311), surface=Surface(population="mean"))
+    true = mean.model_copy(update={"surface": Surface(population=91)})
+    image = photograph(true, true.pose(np.array((-0.5, 1.7, 4.2))), fundus(0.2), rays=8)
+    assert locate(image, true, "cone", noise=NOISE)
+    found = locate(image, mean, "cone", noise=NOISE)
+    assert not found
+    assert found.reason == WRONG_WALL
+    free = locate(image, mean, "cone", noise=NOISE, knowns=Knowns(semi_axes_sigma_mm=SEMI_AXES_SIGMA_MM))
+    assert free, free.reason
 
 
 def test_a_sensor_of_few_bits_is_white_where_they_end_and_rounds_by_their_steps(soft):

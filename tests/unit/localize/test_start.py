@@ -269,3 +269,26 @@ def test_two_believed_answers_that_differ_are_none():
     scene = scene_of()
     starts = [Start(scene.pose(np.array(tip)), 0.4, 0.9, 1.0) for tip in TIPS[:2]]
     assert believed(starts, scene, lambda start: located(start.pose)) == LocalizationFailure(TWO_PLACES)
+
+
+@pytest.mark.parametrize(
+    ("times", "rig", "expected"),
+    [(6.0, "triple", True), (2.0, "triple", False), (0.2, "triple", False), (6.0, "single", False)],
+)
+def test_a_rig_in_its_neighbours_places_that_leaves_the_tip_far_less_sure_is_no_second_answer(times, rig, expected):
+    scene = scene_of(spotlights=rig)
+    here = scene.pose(np.array(TIPS[0]))
+    turned = Pose(here.apex + [0.15, 0.0, 0.0], here.axis, here.roll + 2.1)
+    starts = [Start(pose, 0.7, 0.9, worth) for pose, worth in ((here, 1.2), (turned, 1.0))]
+
+    def answer(start):
+        size = 5 if rig == "single" else 6
+        sigma = 0.01 * (times if start is starts[1] else 1.0)
+        return Localization(start.pose.apex, start.pose.axis, sigma**2 * np.eye(size), roll=start.pose.roll)
+
+    outcome = believed(starts, scene, answer)
+    if expected:
+        assert isinstance(outcome, Localization)
+        assert np.array_equal(outcome.apex_mm, here.apex)
+    else:
+        assert outcome == LocalizationFailure(TWO_PLACES)
