@@ -54,7 +54,7 @@ class Table:
         """What `shown` leaves out, in a sentence; empty if nothing."""
         blocks = len(self.blocks) - len(self.shown)
         lines = sum(len(block.lines) for block in self.blocks) - sum(len(block.lines) for block in self.shown)
-        what = f"{blocks} more blocks ({lines} lines)" if blocks else f"{lines} more lines"
+        what = f"{blocks} more blocks ({lines} lines)" if blocks else f"{lines} lines more"
         return f"{what} stand in tables/{self.name}.csv." if lines else ""
 
     @property
