@@ -178,6 +178,15 @@ def test_closing_stops_the_workers(plan, tmp_path):
     assert not alive
 
 
+def test_workers_that_stay_measure_more_of_the_same_plan(plan, tmp_path):
+    units = list(plan.units())
+    with LocalPool(1, lives).staying() as crew:
+        for part in (units[:3], units[3:5]):
+            records = crew.execute(plan, part, frames=tmp_path, note=print)
+            assert [record.unit for record in records] == [unit.key for unit in part]
+    assert len({path.name.split("-")[1] for path in tmp_path.glob("did-*")}) == 1
+
+
 def test_the_environment_is_as_it_was(plan, tmp_path, monkeypatch):
     monkeypatch.setenv("OMP_NUM_THREADS", "7")
     monkeypatch.delenv("MKL_NUM_THREADS", raising=False)

@@ -9,7 +9,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from conespot.localize.outcome import LocalizationFailure
-from conespot.localize.published.detection import coded_mask, otsu_mask, otsu_threshold, outlines
+from conespot.localize.published.detection import Mask, coded_mask, contrast, otsu_mask, otsu_threshold, outlines
+from conespot.localize.published.settings import PUBLISHED
+from conespot.scene import load_scene
 
 
 def whole_otsu(grey):
@@ -162,7 +164,7 @@ def test_any_sequence_of_frames_is_segmented_as_whole_frames(frames):
         agree(grey)
 
 
-@settings(max_examples=300, deadline=None)
+@settings(max_examples=100, deadline=None)
 @given(st.lists(st.tuples(st.integers(0, 255), st.integers(1, 400)), min_size=1, max_size=12))
 def test_otsus_threshold_is_opencvs_on_every_histogram(levels):
     pixels = np.concatenate([np.full(count, level, np.uint8) for level, count in levels])[None]
@@ -175,3 +177,17 @@ def test_a_few_pixels_of_millions_are_a_class_as_far_as_opencv_counts_them(brigh
     grey[1000, 1000 : 1000 + bright] = 200
     counts = np.bincount(grey.ravel(), minlength=256)
     assert otsu_threshold(counts) == cv2.threshold(grey, 0, 1, cv2.THRESH_OTSU)[0]
+
+
+def test_contrast_is_that_of_every_so_many_rows_and_columns_of_the_whole_frame():
+    rng, scene = np.random.default_rng(9), load_scene("paper-code")
+    for height, width in ((700, 1100), (40, 1300), (260, 90)):
+        grey = rng.integers(0, 256, (height, width)).astype(np.uint8)
+        top, left = int(rng.integers(0, height // 2)), int(rng.integers(0, width // 2))
+        mask = Mask(rng.integers(0, 2, (height // 3, width // 3)).astype(np.uint8), left, top, (height, width))
+        lit = np.zeros(grey.shape, bool)
+        lit[top : top + height // 3, left : left + width // 3] = mask.bright == 1
+        step = max(1, max(grey.shape) // PUBLISHED.contrast_px)
+        around = grey[::step, ::step][~lit[::step, ::step]].mean()
+        inside, ground = scene.sensor.decode(np.array([grey[lit].mean(), around]) / 255.0)
+        assert contrast(grey, mask, scene) == pytest.approx(inside / ground, rel=1e-12)
