@@ -164,7 +164,7 @@ def test_any_sequence_of_frames_is_segmented_as_whole_frames(frames):
         agree(grey)
 
 
-@settings(max_examples=100, deadline=None)
+@settings(max_examples=300, deadline=None)
 @given(st.lists(st.tuples(st.integers(0, 255), st.integers(1, 400)), min_size=1, max_size=12))
 def test_otsus_threshold_is_opencvs_on_every_histogram(levels):
     pixels = np.concatenate([np.full(count, level, np.uint8) for level, count in levels])[None]
