@@ -94,13 +94,15 @@ def judged(
     joint[np.arange(3), np.arange(3)] += VERDICT.floor_mm**2
     joint[np.arange(3, size), np.arange(3, size)] += VERDICT.floor_rad**2
     pose = joint[:size, :size].copy()
-    sigma = math.sqrt(float(np.trace(pose[:3, :3])))
+    variances = np.diag(pose)
+    # of a patch that hardly holds them, rounding makes some negative
+    sigma = math.sqrt(float(np.sum(variances[:3]))) if np.all(variances > 0.0) else math.inf
     limit = VERDICT.largest_free_sigma_mm if knowns.rcm_sigma_mm is None else VERDICT.largest_sigma_mm
     if not math.isfinite(sigma) or sigma > limit:
         return LocalizationFailure(UNCERTAIN)
     if knowns.rcm_sigma_mm is not None:
         reach = float(np.linalg.norm(np.asarray(nominal.instrument.rcm) - estimate.pose.apex))
-        spread = math.hypot(knowns.rcm_sigma_mm, reach * math.sqrt(float(np.max(np.diag(pose)[3:5]))))
+        spread = math.hypot(knowns.rcm_sigma_mm, reach * math.sqrt(float(np.max(variances[3:5]))))
         if float(np.linalg.norm(rcm_miss(estimate.pose, nominal))) > VERDICT.miss_sigmas * spread + 1e-5:
             return LocalizationFailure(MISSES_RCM)
     if misfit > VERDICT.largest_misfit:

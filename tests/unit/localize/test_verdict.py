@@ -91,6 +91,7 @@ def turned(pose, angle):
         ({"pose": Pose(np.array([6.1, 0.0, 22.3]), -np.array([0.1, 0.0, 0.3]) / math.hypot(0.1, 0.3))}, BEHIND),
         ({"sigmas": SIGMAS * 100.0}, UNCERTAIN),
         ({"sigmas": np.array([1e-3, 1e-3, math.inf, 1e-3, 1e-3])}, UNCERTAIN),
+        ({"inflation": -1.0}, UNCERTAIN),
         ({"pose": turned(Scene().pose(TIP), 0.02)}, MISSES_RCM),
         ({"misfit": 4.0}, MISFIT),
         ({"settled": False}, UNSETTLED),
