@@ -79,10 +79,11 @@ def fit_edge(
     if len(points) < EDGE.fewest_points:
         return LocalizationFailure(COVERED)
     patch = _Patch.of(frame, start, points)
+    # the middle of so narrow a patch reaches beyond it, and is not clipped throughout
+    if patch.sharp and patch.clipped > EDGE.clipped and patch.size < EDGE.narrowest:
+        return LocalizationFailure(FEW_PIXELS)
     if not (patch.sharp and patch.clipped > EDGE.throughout):
         return _bands(frame, start, knowns, noise, reference, patch)
-    if patch.size < EDGE.narrowest:
-        return LocalizationFailure(FEW_PIXELS)
     found: list[EdgeFit | LocalizationFailure] = [
         _throughout(replace(frame, ringing=EDGE.ringing), start, knowns, patch.size)
     ]
