@@ -8,7 +8,7 @@ pose.
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import numpy as np
 from pydantic import BeforeValidator, Field, PlainSerializer, model_validator
@@ -63,6 +63,8 @@ class Knowledge(Model):
     camera_height_sigma: LengthSigma = 0.0
     semi_axes_sigma: LengthSigma = 0.0
     relief_sigma: Length = Field(0.0, ge=0.0)
+    deep_amount_sigma: Annotated[float, Field(ge=0.0)] | Literal["usual"] = "usual"
+    deep_length_sigma: Annotated[float, Field(ge=0.0)] | Literal["usual"] = "usual"
     blur: Length | None = Field(None, ge=0.0, le=0.2)
     surface: AnySurface | None = None
     beam: Beam | None = None
@@ -95,6 +97,8 @@ class Knowledge(Model):
             camera_height_sigma_mm=self.camera_height_sigma,
             semi_axes_sigma_mm=self.semi_axes_sigma,
             relief_sigma_mm=self.relief_sigma,
+            deep_amount_sigma=self.deep_amount_sigma,
+            deep_length_sigma=self.deep_length_sigma,
         )
 
     def told(self, scene: Scene, rng: np.random.Generator) -> Scene:

@@ -14,7 +14,9 @@ from conespot.campaigns.knowledge import Knowledge
 from conespot.campaigns.own_scene import described_scene
 from conespot.localize.blur import SharedBlur, shared_blur
 from conespot.localize.calibration import NAMES, QUANTITIES, Calibration, Width, calibrate
+from conespot.localize.deep_light import DEEP, SharedDeep, shared_deep
 from conespot.localize.frames.reader import read_frames
+from conespot.localize.model.deep import Deep
 from conespot.scene import InputError, Scene
 from conespot.scene.atomic import write_atomically
 from conespot.scene.document import Document, dump, find_document, read_value
@@ -30,13 +32,11 @@ _REMEDIES = {
     "eye_radius": "tips 5 mm apart all over the retina, or the eye's axial length by biometry",
     "camera_height": "an object of known size in the eye, since no frame tells how large the whole scene is",
     "retina": "tips 5 mm apart all over the retina, or OCT of it",
+    "deep": "frames without clipped light, of hard-edged patches on several places of the same retina",
     "rcm": "tips further apart to the sides and in height: their axes meet in the RCM",
 }
 #: what no sequence is asked about, and who says it
-_NEVER = (
-    "camera's tilt, azimuth and lens: take OpenCV's calibration of the microscope as camera: {calibration: FILE}; deep"
-    " light: frames of a narrow spot on the same retina, or scene.retina from OCT and the lamp's wavelength"
-)
+_NEVER = "camera's tilt, azimuth and lens: take OpenCV's calibration of the microscope as camera: {calibration: FILE}"
 _EXACT_MM = 1e-9
 #: kinds of quantities by the unit of a sigma
 _KINDS = {"deg": "angle", "mm": "length"}
@@ -60,22 +60,38 @@ def calibrate_own(
     if shape:
         width = replace(width, eye_radius_mm=_EXACT_MM, semi_axes_mm=SEMI_AXES_SIGMA_MM)
     found = calibrate(lambda: (frame.image for frame in read_frames(sources, scene)), scene, width=width)
-    blur = shared_blur((frame.image for frame in read_frames(sources, scene)), found.applied(scene))
-    said = [*_said(found), *_said_of_blur(blur), *found.correlations().splitlines(), f"not asked: {_NEVER}"]
-    calibrated = found.applied(scene) if blur is None else blur.applied(found.applied(scene))
-    text = _file(calibrated, knowledge, found, said, width)
+    calibrated = found.applied(scene)
+    blur = shared_blur((frame.image for frame in read_frames(sources, scene)), calibrated)
+    calibrated = calibrated if blur is None else blur.applied(calibrated)
+    deep = shared_deep((frame.image for frame in read_frames(sources, scene)), calibrated)
+    said = [*_said(found), *_said_of_blur(blur), *_said_of_deep(deep, calibrated)]
+    said += [*found.correlations().splitlines(), f"not asked: {_NEVER}"]
+    calibrated = calibrated if deep is None else deep.applied(calibrated)
+    text = _file(calibrated, _known(knowledge, found, deep, width), found, said)
     read_scene(Document(str(out), _without_knowledge(text, out), folder=out.parent))  # what is written can be read
     write_atomically(out, text.encode())
     yield from said
     yield f"{out}: from {found.frames} frames; next: campaign localize FRAMES --scene {out}"
 
 
-def _said(found: Calibration) -> Iterator[str]:
+def _said(found: Calibration | SharedDeep) -> Iterator[str]:
     """A line a quantity: its value and sigma, or what would show it."""
     for line in found.statement().splitlines():
         quantity = line.partition(":")[0]
         remedy = next(said for start, said in _REMEDIES.items() if quantity.startswith(start))
         yield line if found.observable[quantity] else f"{line}; what would show it: {remedy}"
+
+
+def _said_of_deep(deep: SharedDeep | None, scene: Scene) -> Iterator[str]:
+    """Lines on the deep light; what would show it where these frames do not, or the scene has none to be asked for."""
+    if deep is not None:
+        yield from _said(deep)
+    elif scene.spread is None:
+        yield "deep light: the scene has none; to have it asked for, give the scene retina: {kind: fundus, spread: {}}"
+    elif Deep.of(scene) is None:
+        yield "deep light: too little to be seen at this wavelength; what would show it: infrared light"
+    else:
+        yield f"deep light: not observable from this sequence; what would show it: {_REMEDIES['deep']}"
 
 
 def _said_of_blur(blur: SharedBlur | None) -> Iterator[str]:
@@ -87,8 +103,17 @@ def _said_of_blur(blur: SharedBlur | None) -> Iterator[str]:
     yield f"{said}; what would show it: patches that are not clipped, or a slanted edge in focus (ISO 12233)"
 
 
-def _file(scene: Scene, knowledge: Knowledge, found: Calibration, said: Sequence[str], width: Width) -> str:
+def _file(scene: Scene, known: dict[str, object], found: Calibration, said: Sequence[str]) -> str:
     """The text of a calibrated scene's file: what was found in comments, the scene, and how well it is known."""
+    lines = [f"# Written by `campaign calibrate` from {found.frames} frames, with standard deviations:"]
+    lines += [textwrap.fill(line, _WIDTH, initial_indent="#   ", subsequent_indent="#     ") for line in said]
+    lines += ["# What is not said here is as conespot has it by default; `campaign explain KEY` says what a key means."]
+    lines += [dump(essence(scene)).rstrip(), "# how well the localizers may take it to be known"]
+    return "\n".join([*lines, dump({KNOWLEDGE: known})])
+
+
+def _known(knowledge: Knowledge, found: Calibration, deep: SharedDeep | None, width: Width) -> dict[str, object]:
+    """The sigmas of a scene's file: what was found as well as it was, the rest as well as it was known before."""
     known = {key: value for key, value in knowledge.model_dump(mode="json").items() if key.endswith("_sigma")}
     for quantity, sigma in zip(QUANTITIES, found.sigmas, strict=False):
         field = _field(quantity.known)
@@ -98,11 +123,11 @@ def _file(scene: Scene, knowledge: Knowledge, found: Calibration, said: Sequence
     if all(found.observable[name] for name in NAMES[-3:]):
         sideways = math.hypot(width.play_mm, float(max(found.sigmas[-3:])))
         known["rcm_sigma"] = format_quantity(float(f"{sideways:.3g}"), "length")
-    lines = [f"# Written by `campaign calibrate` from {found.frames} frames, with standard deviations:"]
-    lines += [textwrap.fill(line, _WIDTH, initial_indent="#   ", subsequent_indent="#     ") for line in said]
-    lines += ["# What is not said here is as conespot has it by default; `campaign explain KEY` says what a key means."]
-    lines += [dump(essence(scene)).rstrip(), "# how well the localizers may take it to be known"]
-    return "\n".join([*lines, dump({KNOWLEDGE: known})])
+    if deep is not None:  # the next frame has its patch on another place
+        for quantity, sigma in zip(DEEP, deep.places, strict=True):
+            if deep.observable[quantity.name]:
+                known[quantity.known] = float(f"{sigma:.3g}")
+    return known
 
 
 def _field(known: str) -> str:

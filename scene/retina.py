@@ -81,6 +81,10 @@ class Glint(Model):
     roughness: float = Field(0.15, gt=0.0, le=1.0)
 
 
+#: between which factors deep light may be more or less, and go farther or less far
+LEAST_DEEP, MOST_DEEP = 0.25, 4.0
+
+
 class Spread(Model):
     """Light that enters the tissue behind the pigment epithelium comes back elsewhere (scene.spread).
 
@@ -89,8 +93,8 @@ class Spread(Model):
     """
 
     scattering: float = Field(1.0, ge=0.5, le=2.0)
-    amount: float = Field(1.0, ge=0.25, le=4.0)
-    length: float = Field(1.0, ge=0.25, le=4.0)
+    amount: float = Field(1.0, ge=LEAST_DEEP, le=MOST_DEEP)
+    length: float = Field(1.0, ge=LEAST_DEEP, le=MOST_DEEP)
 
 
 class Fundus(Model):

@@ -141,6 +141,7 @@ def test_what_a_sequence_does_not_show_stays_as_it_was_and_is_said_with_what_wou
     for name in ("half_angle", "camera_height", "rcm_z"):
         assert f"{name}: not observable" in said
     assert "what would show it: an object of known size" in said
+    assert "deep light: the scene has none; to have it asked for, give the scene retina: " in said
     assert found.instrument.rcm[2] == 22.0
     assert found.beam.half_angle == pytest.approx(math.radians(9.0))
     assert found.camera == load_scene(own / "my.yaml").camera.with_columns(300)

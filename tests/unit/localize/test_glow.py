@@ -12,6 +12,7 @@ from scipy.ndimage import map_coordinates
 
 from conespot.localize import Knowns, SensorNoise, locate
 from conespot.localize.calibration import NAMES, calibrate
+from conespot.localize.deep_light import SharedDeep, shared_deep
 from conespot.localize.halo import glows
 from conespot.localize.image import Frame
 from conespot.localize.model.deep import Deep
@@ -232,6 +233,31 @@ def test_frames_that_glow_calibrate_a_softness():
     at = NAMES.index("softness")
     assert found.observable["softness"]
     assert found.values[at] == pytest.approx(0.9, abs=4.0 * found.sigmas[at])
+
+
+@pytest.mark.parametrize("beam", [HardBeam(), pytest.param(CyclesBeam(), marks=pytest.mark.slow)], ids=["hard", "soft"])
+def test_three_frames_tell_how_much_deep_light_there_is_and_how_far_it_goes(beam):
+    """Told 1.5 times what there is, and 0.8 times as far: within three stated sigmas, which are below a tenth."""
+    scene = scene_of(beam, resolution=300)
+    told = scene_of(beam, resolution=300, spread=Spread(amount=1.5, length=0.8))
+    tips = ((1.0, 0.0, 4.0), (-1.0, 1.5, 3.5), (0.0, -1.5, 5.0))
+    frames = [frame(scene, scene.pose(np.array(tip)), k) for k, tip in enumerate(tips)]
+    found = shared_deep(frames, told, NOISE)
+    assert all(found.observable.values())
+    assert np.all(np.abs(found.values) < 3.0 * found.sigmas)  # logarithms of 1 and 1
+    assert np.all(found.sigmas < 0.1)
+    assert np.all(found.places >= found.sigmas)
+    assert found.applied(told).spread.amount == pytest.approx(math.exp(found.values[0]))
+
+
+def test_deep_light_that_frames_do_not_tell_stays_as_it_was():
+    told = scene_of(spread=Spread(amount=1.5))
+    vague = SharedDeep(np.zeros(2), np.diag(np.square([0.3, 0.1])), np.array([0.4, 0.2]), 3)
+    assert vague.applied(told).spread == Spread(amount=1.5, length=1.0)
+    assert vague.statement().startswith("deep_amount: not observable from this sequence (1.000")
+    beyond = SharedDeep(np.array([2.0, 0.0]), np.diag([0.01, 0.01]), np.array([0.4, 0.2]), 3)
+    assert beyond.applied(told).spread.amount == 4.0
+    assert shared_deep([], told.model_copy(update={"retina": Fundus()})) is None
 
 
 def test_a_bound_with_deep_light_is_that_of_a_sixth_of_the_edge():
