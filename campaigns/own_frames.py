@@ -133,12 +133,16 @@ def outputs(
 def localize(
     own: OwnFrames, sources: Sequence[Path], alarm: Alarm | None, beside: Sequence[Output], count: Count
 ) -> Iterator[str]:
-    """The lines of the table for people, as the frames come; `count` is counted up, and the outputs are written."""
+    """The lines of the table for people, as the frames come; `count` is counted up, and the outputs are written.
+
+    Nothing is said before the first answer: a sentence that refuses the first frame stands alone.
+    """
     table = Table(alarm)
-    if note := noiseless(own.scene):
-        yield f"note: {note}"
-    yield from table.head()
     for answer in own.answers(sources, alarm):
+        if not count.frames:
+            if note := noiseless(own.scene):
+                yield f"note: {note}"
+            yield from table.head()
         count.frames += 1
         if not answer.outcome:
             count.refused[str(getattr(answer.outcome, "reason", ""))] += 1

@@ -169,3 +169,12 @@ def test_the_scene_that_is_calibrated_is_not_written_over(own, capsys):
     assert main([*map(str, command)]) == 2  # two frames are too few
     assert "at least three frames" in capsys.readouterr().err
     assert not (own / "other.yaml").exists()
+
+
+def test_where_the_first_frame_does_not_fit_its_sentence_stands_alone(own, tmp_path, capsys):
+    cv2.imwrite(str(tmp_path / "small.png"), np.zeros((9, 9), np.uint16))
+    assert localize(own, tmp_path / "small.png", "--alarm", "0.1 mm", "--csv", tmp_path / "x.csv") == 2
+    said = capsys.readouterr()
+    assert said.out == ""
+    assert len(said.err.splitlines()) == 1
+    assert not (tmp_path / "x.csv").exists()
