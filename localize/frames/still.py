@@ -37,6 +37,8 @@ _MOST_BYTES, _BESIDE_BYTES = 32, 8_000_000
 #: bytes of a TIFF of several pages: it is held in memory, twice for a moment
 _MOST_STACK_BYTES = 400_000_000
 _ORIENTATION = 274
+#: where a PNG's first chunk says how many bits a value has, and of which colours it is
+_PNG_BITS, _PNG_COLOUR = 24, 25
 _TIFF_KINDS = {0: "white is zero", 3: "a palette", 4: "a mask", 5: "CMYK", 6: "YCbCr", 8: "CIELAB"}
 
 
@@ -123,6 +125,10 @@ def _png(name: str, raw: bytes, scene: Scene) -> Stored:
         raise _broken(name, "PNG", error) from None
     if several:
         raise InputError(f"{name}: is an animated PNG; save one frame a file")
+    # of the header (PNG 1.2, 11.2.2): libpng would show fewer bits, and a palette, as 8 in silence
+    if raw[_PNG_COLOUR] == 3 or raw[_PNG_BITS] < 8:
+        said = "of a palette" if raw[_PNG_COLOUR] == 3 else f"of {raw[_PNG_BITS]} bits"
+        raise InputError(f"{name}: is a PNG {said}; save it in grey or RGB, with 8 or 16 bits")
     check_size(name, size[1], size[0], (turn, Turn.stated(scene.storage)), scene)
     try:
         Image.open(io.BytesIO(raw), formats=["PNG"]).verify()  # every chunk's checksum: libpng would complain on stderr

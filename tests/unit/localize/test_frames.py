@@ -124,6 +124,13 @@ def test_an_opaque_alpha_is_dropped_and_a_transparent_one_refused(tmp_path, endi
         read(path, sensor="srgb8-colour")
 
 
+@pytest.mark.parametrize(("mode", "said"), [("P", "of a palette"), ("1", "of 1 bits")])
+def test_a_png_of_a_palette_or_of_fewer_than_8_bits_is_refused(tmp_path, mode, said):
+    Image.fromarray(np.tile(np.arange(400, dtype=np.uint8) // 2, (400, 1))).convert(mode).save(tmp_path / "x.png")
+    with pytest.raises(InputError, match=f"is a PNG {said}; save it in grey or RGB"):
+        read(tmp_path / "x.png")
+
+
 def test_float_pixels_above_white_need_the_scenes_word(tmp_path):
     light = np.asarray(VALUES, np.float32)
     cv2.imwrite(str(tmp_path / "x.tiff"), light)
