@@ -81,7 +81,10 @@ def check(run: Run, expectations: Sequence[Expectation]) -> list[Verdict]:
     for expectation in expectations:
         metric = METRICS[expectation.metric]
         try:
-            lines = _selected(*tables[metric.table], expectation)
+            frame, labels = tables[metric.table]
+            if metric.table == "errors" and frame is not None:
+                frame = _own(run, frame, expectation)
+            lines = _selected(frame, labels, expectation)
             if metric.table == "errors":
                 _refuse_unfinished(run, lines)
             verdicts.append(Verdict(expectation, _value(metric, lines), _assumed(run, metric.table, lines)))
@@ -152,6 +155,16 @@ def _table(run: Run, table: AnyTable) -> tuple[pd.DataFrame | None, Sequence[str
         case "white":
             made = white_table(run)
             return (made.frame if made else None), [n for n in (run.rows.group if run.rows else ()) if n not in AXES]
+
+
+def _own(run: Run, rows: pd.DataFrame, expectation: Expectation) -> pd.DataFrame:
+    """The rows of the campaign's own localizers, unless the expectation names which it is about.
+
+    What others scored beside them (`campaign score`) is none of what the campaign's author had in mind.
+    """
+    own = {name for case in run.cases.values() for name in case.localizers}
+    named = expectation.where.get("localizer", ANY) != ANY
+    return rows if named or not own else rows[rows["localizer"].isin(own)]
 
 
 def _refuse_unfinished(run: Run, lines: pd.DataFrame) -> None:

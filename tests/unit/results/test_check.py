@@ -39,6 +39,15 @@ def lines(rows, **where):
     return rows
 
 
+def test_what_others_scored_counts_for_no_expectation_that_does_not_name_it(tmp_path, make_run, make_cases, rows):
+    theirs = rows.assign(localizer="theirs", status="failed", position_error_mm=float("nan"))
+    both = load_run(make_run(tmp_path / "run", pd.concat([rows, theirs]), described=make_cases(rows)))
+    alone = (lines(rows, **CELL)["status"] == "failed").mean()
+    for localizer in ({}, {"localizer": "any"}):
+        assert verdict(both, "failed share", {**CELL, **localizer}).found == pytest.approx(alone)
+    assert verdict(both, "failed share", {**CELL, "localizer": "theirs"}).found == 1.0
+
+
 @pytest.mark.parametrize(
     ("metric", "column", "statistic"),
     [
