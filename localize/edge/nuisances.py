@@ -61,7 +61,7 @@ class Nuisances:
         albedo = self.level + self.slow @ self.strips.slow + self.strips.log_albedo(self.levels)
         model = np.exp(albedo) * brightness
         variance = self.noise.variance(model) / self.pixels / np.square(np.maximum(model, 1e-9))
-        residual, bound = log_residuals(shown, model, variance)
+        residual, bound = log_residuals(shown, model)
         use = shown.usable | bound
         # the scatter that counts is that of the bins which hold the edge, and it tells how far the edge still is off
         pull = np.abs(rows[2]) / incident

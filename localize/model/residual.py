@@ -55,12 +55,13 @@ def incident_light(ambient: Array, spotlights: Array) -> Array:
     return np.where(light > 0.0, light, np.nan)
 
 
-def log_residuals(shown: Shown, model: Array, variance: Array) -> tuple[Array, NDArray[np.bool_]]:
+def log_residuals(shown: Shown, model: Array, variance: Array | float = 0.0) -> tuple[Array, NDArray[np.bool_]]:
     """Log of the light that a channel's bins show over the `model`'s [white], and which of them are bounds only.
 
     To first order where they nearly agree, or differ by no more than the sensor's noise does, of that `variance` over
-    the model's square: the mean of a logarithm of noise is not that of noise. A clipped bin says only that its light
-    is above white.
+    the model's square: the mean of a logarithm of noise is not that of noise. An edge's bins give none: where no other
+    light is about, their model is next to none a pixel beyond the rim, and a fit that takes what is there to first
+    order creeps and does not settle. A clipped bin says only that its light is above white.
     """
     relative = shown.signal / model - 1.0
     log = np.log(np.maximum(shown.signal, RESIDUAL.darkest * model) / model)
