@@ -21,11 +21,6 @@ GLOWS: Final = (
     "the patch glows beyond its rim, as light from under the retina does, and does not fit what is usual of that: give "
     "the scene's retina a spread"
 )
-#: of a soft patch
-VARIED: Final = (
-    "the retina under the patch differs more than that around it: the optic disc's rim may pass for the light's end; "
-    "give a reference frame without spotlights"
-)
 #: reasons of the published methods
 NOTHING_FOUND: Final = "nothing found: no patch stands out of the background"
 NO_LIGHT: Final = "no light of a spotlight: nothing is twice as bright as its surroundings"

@@ -15,7 +15,7 @@ from conespot.localize.image import AnyImage, Frame, Reference
 from conespot.localize.model.estimate import Estimate
 from conespot.localize.model.knowns import Knowns
 from conespot.localize.model.noise import NoiseModel
-from conespot.localize.outcome import VARIED, Localization, LocalizationFailure, Outcome
+from conespot.localize.outcome import LocalizationFailure, Outcome
 from conespot.localize.start.search import Start
 from conespot.localize.verdict import judged
 from conespot.scene.scene import Scene
@@ -48,8 +48,7 @@ def patch_outcome(
     fit = fit_patch(frame, start, knowns, noise, reference)
     if isinstance(fit, LocalizationFailure):
         return fit
-    found = judged(
+    return judged(
         fit.estimate, fit.covariance, start.scene, fit.knowns,
         misfit=fit.misfit, covered=fit.lit_share, settled=fit.settled,
     )  # fmt: skip
-    return LocalizationFailure(VARIED) if isinstance(found, Localization) and fit.varied else found

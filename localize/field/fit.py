@@ -48,11 +48,6 @@ class FieldFit:
     contradicted: bool  #: whether the windows show what was taken as told to be otherwise
 
     @cached_property
-    def varied(self) -> bool:
-        """Whether under every patch the albedo differs so much that its rim may pass for the light's."""
-        return all(piece.varied() for piece in self.pieces)
-
-    @cached_property
     def covariance(self) -> Array:
         """Covariance of the pose and the free quantities `[P, P]`: a sandwich (`field.sandwich`)."""
         bread, size = inverse(self.normal), len(self.prior)

@@ -16,8 +16,6 @@ from conespot.localize.model.residual import incident_light, log_residuals, rms
 from conespot.localize.model.view import Bins, Shown
 
 Array = NDArray[np.float64]
-#: half of a Gaussian's draws are nearer to its middle
-_MEDIAN_SIGMAS = 0.6745
 
 
 def _chroma(lead: Shown, others: list[Shown]) -> Array:
@@ -99,18 +97,6 @@ class Piece:
         """Share of the window's lit bins that can be measured."""
         lit = self._lit & self._seen
         return float(np.count_nonzero(self._usable & lit)) / max(1.0, float(np.count_nonzero(lit)))
-
-    def varied(self) -> bool:
-        """Whether the albedo differs so much under the light, and not beside it, that its rim may pass for the light's.
-
-        A vessel is a small part of a patch, so it is the median that counts there; beside it every bin does. Where
-        light from under the retina is all over the window nothing is beside it, and the answer is no.
-        """
-        inside, beside = self._albedo[self._usable & self._lit], self._albedo[self._usable & ~self._lit]
-        if not len(inside) or not len(beside):
-            return False
-        spread = float(np.median(np.abs(inside - np.median(inside)))) / _MEDIAN_SIGMAS
-        return spread > max(FIELD.varied, FIELD.varied_beside * float(beside.std()))
 
     def linearize(self, light: Array, rows: Array, log_gain: float) -> tuple[Array, Array]:
         """Information `[P + 1, P + 1]` and gradient `[P + 1]` of the pose and the log gain.

@@ -81,13 +81,6 @@ class FieldSettings:
     least_local: float = 0.5
     #: largest square of a bin's rest that counts: a vessel's. Not critical
     largest_excess: float = 1.0
-    #: how much the log albedo may differ under the light (the median from the median, as a Gaussian's sigma), and how
-    #: much more than beside it (rms). Frames of `campaign run gross_errors --poses 76`, made again with 24 samples:
-    #: fits of two tips across the optic disc, 154 to 758 um off in 17 frames, have 0.22 to 0.57, which is 1.7 to 4.7
-    #: times what is beside; of eight other tips that touch a disc (532 and 850 nm) up to 0.99, but at most 0.90 times;
-    #: 26 elsewhere (six eyes, 532 nm, `led-b1`, `led-b5`, `led-v1`) at most 0.10
-    varied: float = 0.16
-    varied_beside: float = 1.25
     #: draws of white noise that tell what a fit leaves of it: far better known than by the frame's one
     whites: int = 8
     #: whitened rests count up to here where neighbours are compared. Not critical

@@ -1,14 +1,12 @@
 """The albedo's cosine modes and what is left of it beyond them."""
 
 import math
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 from conespot.localize import Knowns
 from conespot.localize.field.albedo import Modes, even
-from conespot.localize.field.piece import Piece
 from conespot.localize.field.roughness import Roughness
 from conespot.localize.field.settings import FIELD
 from conespot.localize.model.estimate import Estimate
@@ -91,27 +89,3 @@ def test_a_bin_between_three_patches_counts_in_one_window_only():
         seen = Bins(at, estimate, Knowns(), spotlight).seen.reshape(at.height, at.width)
         count[at.row : at.row + at.height, at.column : at.column + at.width] += seen
     assert count.max() == 1
-
-
-@pytest.mark.parametrize(
-    ("bright", "lit", "doubted"),
-    [
-        ("a disc under the light", 30.0, True),
-        ("mottle alone", 30.0, False),
-        ("a vessel under the light", 30.0, False),
-        ("a disc half beside it", 30.0, False),
-        ("a disc under the light", 90.0, False),  # which is all over the window
-    ],
-)
-def test_an_albedo_that_differs_under_the_light_alone_is_doubted(bright, lit, doubted):
-    y, x = np.mgrid[:100, :100] - 49.5
-    albedo = 0.08 * np.random.default_rng(5).standard_normal((100, 100))
-    match bright:
-        case "a disc under the light":
-            albedo[np.hypot(x - 5.0, y) < 22.0] += 0.7
-        case "a disc half beside it":
-            albedo[np.hypot(x - 30.0, y) < 22.0] += 0.7
-        case "a vessel under the light":
-            albedo[np.abs(x - y) < 4.0] -= 0.7
-    piece = SimpleNamespace(_albedo=albedo, _lit=np.hypot(x, y) < lit, _usable=np.ones((100, 100), bool))
-    assert Piece.varied(piece) == doubted
