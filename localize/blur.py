@@ -12,14 +12,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from conespot.localize.edge.fit import fit_edge
-from conespot.localize.image import AnyImage, Frame
-from conespot.localize.model.estimate import Estimate
+from conespot.localize.image import AnyImage
 from conespot.localize.model.knowns import Knowns
 from conespot.localize.model.noise import NoiseModel
 from conespot.localize.model.quantity import quantity
-from conespot.localize.outcome import LocalizationFailure
-from conespot.localize.start.search import find_start
+from conespot.localize.settled_fits import settled_fits
 from conespot.scene.scene import Scene
 
 #: standard deviations of the squared width that one must have to be seen; a bound of 95 % on what is not
@@ -63,14 +60,7 @@ def shared_blur(frames: Iterable[AnyImage], scene: Scene, noise: NoiseModel | No
     """The blur of checked frames of one scene, whose poses are not known; None where fewer than three show an edge."""
     blur, knowns = quantity("blur"), Knowns(blur_sigma_mm=None).within(scene)
     found = []
-    for image in frames:
-        frame = Frame(image, scene.sensor)
-        start = find_start(frame, scene)
-        if isinstance(start, LocalizationFailure):
-            continue
-        fit = fit_edge(frame, Estimate(start.pose, scene), knowns, noise or scene.sensor.noise)
-        if isinstance(fit, LocalizationFailure) or not fit.settled:
-            continue
+    for fit in settled_fits(frames, scene, knowns, noise):
         at = fit.estimate.pose_size + fit.knowns.free.index(blur) if blur in fit.knowns.free else -1
         if at >= 0 and 0.0 < fit.covariance[at, at] < math.inf:
             found.append((blur.value(fit.estimate.scene), float(fit.covariance[at, at])))

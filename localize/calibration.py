@@ -15,15 +15,12 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from conespot.localize.edge.fit import fit_edge
 from conespot.localize.edge.sandwich import EdgeFit
-from conespot.localize.image import AnyImage, Frame
-from conespot.localize.model.estimate import Estimate
+from conespot.localize.image import AnyImage
 from conespot.localize.model.knowns import Knowns
 from conespot.localize.model.noise import NoiseModel
 from conespot.localize.model.solve import inverse, reduction
-from conespot.localize.outcome import LocalizationFailure
-from conespot.localize.start.search import find_start
+from conespot.localize.settled_fits import settled_fits
 from conespot.scene.document import InputError
 from conespot.scene.pose import tangents
 from conespot.scene.scene import Scene
@@ -150,7 +147,6 @@ def calibrate(
     last, held so tightly that all frames' equations belong to one point: otherwise the size of the whole scene, which
     no image tells, would seem to be known. Raises InputError if fewer than three frames can be fitted.
     """
-    sensor = noise or scene.sensor.noise
     nominal = _values(scene)
     widths = width.sigmas(scene)
     prior = 1.0 / np.square(widths)
@@ -163,15 +159,8 @@ def calibrate(
     covariance = np.diag(1.0 / prior)
     for _ in range(CALIBRATION.rounds):
         here = _values(now)
-        terms = []
-        for image in frames():
-            frame = Frame(image, scene.sensor)
-            start = find_start(frame, now)
-            if isinstance(start, LocalizationFailure):
-                continue
-            fit = fit_edge(frame, Estimate(start.pose, now), tight.within(now), sensor)
-            if not isinstance(fit, LocalizationFailure) and fit.settled:
-                terms.append(_seen(*_term(fit, now, tight, width), widths))
+        fits = settled_fits(frames(), now, tight.within(now), noise)
+        terms = [_seen(*_term(fit, now, tight, width), widths) for fit in fits]
         if len(terms) < 3:
             raise InputError("calibration needs at least three frames in which the patch can be measured")
         # a frame that a vessel or a glint misled pulls the others: its step is the longest

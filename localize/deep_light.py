@@ -14,16 +14,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from conespot.localize.calibration import CALIBRATION
-from conespot.localize.edge.fit import fit_edge
-from conespot.localize.image import AnyImage, Frame
+from conespot.localize.image import AnyImage
 from conespot.localize.model.deep import Deep
-from conespot.localize.model.estimate import Estimate
 from conespot.localize.model.knowns import DEEP_SIGMA, Knowns
 from conespot.localize.model.noise import NoiseModel
 from conespot.localize.model.quantity import quantity
 from conespot.localize.model.solve import inverse
-from conespot.localize.outcome import LocalizationFailure
-from conespot.localize.start.search import find_start
+from conespot.localize.settled_fits import settled_fits
 from conespot.scene.retina import LEAST_DEEP, MOST_DEEP
 from conespot.scene.scene import Scene
 
@@ -83,14 +80,7 @@ def shared_deep(frames: Iterable[AnyImage], scene: Scene, noise: NoiseModel | No
     knowns = Knowns().within(scene)
     nominal, prior = np.array([each.value(scene) for each in DEEP]), np.eye(2) / DEEP_SIGMA**2
     values, told, pulls = [], [], []
-    for image in frames:
-        frame = Frame(image, scene.sensor)
-        start = find_start(frame, scene)
-        if isinstance(start, LocalizationFailure):
-            continue
-        fit = fit_edge(frame, Estimate(start.pose, scene), knowns, noise or scene.sensor.noise)
-        if isinstance(fit, LocalizationFailure) or not fit.settled:
-            continue
+    for fit in settled_fits(frames, scene, knowns, noise):
         at = [fit.estimate.pose_size + fit.knowns.free.index(each) for each in DEEP]
         here = np.array([each.value(fit.estimate.scene) for each in DEEP])
         # all that the frame says less the prior, which all frames have only once

@@ -60,9 +60,9 @@ class Nuisances:
             self._begin(brightness)
         albedo = self.level + self.slow @ self.strips.slow + self.strips.log_albedo(self.levels)
         model = np.exp(albedo) * brightness
-        variance = self.noise.variance(model) / self.pixels / np.square(np.maximum(model, 1e-9))
         residual, bound = log_residuals(shown, model)
         use = shown.usable | bound
+        variance = self.noise.variance(model) / self.pixels / np.square(np.maximum(model, 1e-9))
         # the scatter that counts is that of the bins which hold the edge, and it tells how far the edge still is off
         pull = np.abs(rows[2]) / incident
         steady = use & (pull > EDGE.steady * np.quantile(pull, 0.98))
