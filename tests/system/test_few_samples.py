@@ -44,8 +44,8 @@ def both():
     return make
 
 
-#: bumps take as long as all others
-EACH = [pytest.param(name, marks=pytest.mark.slow if name == "bumps" else ()) for name in SCENES]
+#: bumps take as long as all others, and a real camera as long as the rest
+EACH = [pytest.param(name, marks=pytest.mark.slow if name in {"bumps", "camera"} else ()) for name in SCENES]
 
 
 @pytest.mark.parametrize("name", EACH)

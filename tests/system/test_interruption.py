@@ -135,6 +135,7 @@ def test_a_second_ctrl_c_ends_at_once_and_what_is_finished_is_kept(tmp_path):
     wait_until(lambda: not running(tmp_path), 5)
 
 
+@pytest.mark.slow
 def test_a_signal_that_was_ignored_at_the_start_stays_ignored(tmp_path):
     """As `nohup` starts a run, and as a shell starts one in the background."""
     process = begin(tmp_path, poses=20, ignored=[signal.SIGHUP, signal.SIGINT], POSE_S="0.05")

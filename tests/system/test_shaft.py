@@ -20,8 +20,8 @@ KNOWNS = Knowns(rcm_sigma_mm=None)
 #: light, rig, tip [mm], largest error [mm]: hard edges to a micrometre or two, a soft one on texture to tens of them
 CASES = [
     (HardBeam(), "single", (5.0, 1.0, 4.0), 2e-3),
-    (HardBeam(), "single", (3.0, 1.0, 4.0), 2e-3),
-    (HardBeam(), "triple", (5.0, 1.0, 4.0), 1e-3),
+    pytest.param(HardBeam(), "single", (3.0, 1.0, 4.0), 2e-3, marks=pytest.mark.slow),
+    pytest.param(HardBeam(), "triple", (5.0, 1.0, 4.0), 1e-3, marks=pytest.mark.slow),
     (CyclesBeam(), "single", (4.0, -1.0, 3.0), 0.05),
 ]
 

@@ -99,7 +99,9 @@ def test_the_mesh_keeps_to_the_surface(name, depart):
     assert np.all((corner < 0.0) | (corner > scene.camera.resolution))
 
 
-@pytest.mark.parametrize("name", SURFACES)
+@pytest.mark.parametrize(
+    "name", [pytest.param(name, marks=() if name == "all" else pytest.mark.slow) for name in SURFACES]
+)
 def test_cone_finds_the_tip_to_two_micrometres_on_a_surface_it_is_told_of_and_not_if_told_of_a_sphere(name):
     scene = scene_on(name)
     renderer = Renderer(scene, samples=512)

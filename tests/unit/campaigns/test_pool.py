@@ -118,7 +118,11 @@ def test_a_unit_whose_worker_dies_is_tried_once_more(plan, tmp_path):
 
 @pytest.mark.parametrize("workers", [2, pytest.param(1, marks=pytest.mark.slow)])
 @pytest.mark.parametrize(
-    ("how", "says"), [("dies", "was killed by SIGKILL (out of memory?)"), ("exits", "ended with exit code 3")]
+    ("how", "says"),
+    [
+        ("dies", "was killed by SIGKILL (out of memory?)"),
+        pytest.param("exits", "ended with exit code 3", marks=pytest.mark.slow),
+    ],
 )
 def test_a_unit_that_kills_two_workers_is_given_up_and_no_other(plan, tmp_path, workers, how, says):
     records, notes = do(plan, tmp_path, workers, script=f"0 {how}\n4 {how}")

@@ -83,6 +83,7 @@ def test_a_reference_frame_makes_a_soft_patch_on_texture_sharper():
     assert np.trace(found.covariance[:3, :3]) < np.trace(alone.covariance[:3, :3])
 
 
+@pytest.mark.slow
 def test_the_mean_of_many_reference_frames_makes_a_hard_patch_on_coarse_texture_sharper():
     scene = scene_of(HardBeam())
     pose, texture = scene.pose(np.array(TIPS[0])), fundus(0.5)

@@ -45,7 +45,9 @@ def missed_um(localizer, *, real, soft=False, **more):
     return 1e3 * float(np.sqrt(np.mean(np.square(errors))))
 
 
-@pytest.mark.parametrize("soft", [False, True], ids=["hard", "soft"])
+@pytest.mark.parametrize(
+    "soft", [pytest.param(False, id="hard"), pytest.param(True, id="soft", marks=pytest.mark.slow)]
+)
 @pytest.mark.parametrize("localizer", ["cone", "photometric"])
 def test_an_oblong_aslant_distorting_camera_is_as_good_as_the_ideal_one(localizer, soft):
     real, ideal = (missed_um(localizer, real=camera, soft=soft, noise=NOISE) for camera in (True, False))
