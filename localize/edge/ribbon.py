@@ -20,6 +20,7 @@ from conespot.localize.model.sight import look
 from conespot.localize.model.view import Shown, Window, log_albedo
 from conespot.scene.scene import Scene
 from conespot.scene.spotlights import spotlight_axes
+from conespot.scene.vignetting import seen_whole
 
 Array = NDArray[np.float64]
 
@@ -50,7 +51,7 @@ class Ribbon:
             points = outline / side - 0.5
             finite = np.all(np.isfinite(points), axis=1)
             inside = finite & np.all((points > 1.0) & (points < edge - 2.0), axis=1)
-            inside &= ~covered(outline, estimate.pose, scene, side=side)
+            inside &= ~covered(outline, estimate.pose, scene, side=side) & seen_whole(scene.camera, outline)
             seen.append(float(np.mean(inside)))
             if inside.sum() >= EDGE.fewest_points:
                 curves.append(points[finite])
@@ -70,7 +71,7 @@ class Ribbon:
         spots, alone = _nearest_outline(pixels, estimate)
         distance = distances(pixels, spots, estimate)[0] / side
         keep = np.isfinite(distance) & alone & (distance > -inner) & (distance < outer)
-        keep &= ~covered(pixels, estimate.pose, scene, side=side)
+        keep &= ~covered(pixels, estimate.pose, scene, side=side) & seen_whole(scene.camera, pixels)
         if np.count_nonzero(keep) < EDGE.fewest_bins:
             return None
         row, column, pixels, spots, distance = row[keep], column[keep], pixels[keep], spots[keep], distance[keep]

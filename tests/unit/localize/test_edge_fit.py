@@ -7,6 +7,7 @@ from hypothesis import strategies as st
 
 from conespot.localize import Knowns, SensorNoise
 from conespot.localize.edge.fit import fit_edge
+from conespot.localize.edge.ribbon import Ribbon
 from conespot.localize.edge.saturated import SaturatedFit
 from conespot.localize.edge.strips import Strips, score_covariance
 from conespot.localize.image import Frame
@@ -15,11 +16,13 @@ from conespot.localize.model.forward import ambient_irradiance, light, moved
 from conespot.localize.model.profile import Profile
 from conespot.localize.model.sight import look, window
 from conespot.localize.theory.bounds import cramer_rao
-from conespot.scene import Scene
+from conespot.scene import Pose, Scene, load_scene
 from conespot.scene.beam import CyclesBeam, HardBeam, LinearBeam
 from conespot.scene.camera import Camera
 from conespot.scene.sensor import Linear, Srgb8
+from conespot.scene.spotlights import RIGS
 from conespot.scene.surface import Surface
+from conespot.scene.vignetting import seen_whole
 
 PEAK, AMBIENT, READ = 9000.0, 200.0, 15.0
 NOISE = SensorNoise(levels=4095, electrons=1.25 * PEAK, read=READ)
@@ -190,3 +193,20 @@ def test_strips_that_cannot_be_told_leave_no_covariance_and_no_error():
     parts = np.tile(np.eye(2), (40, 1, 1))
     parts[3, 0, 0] = np.nan
     assert np.all(np.isinf(score_covariance(strips, np.ones((40, 2)), parts)))
+
+
+def test_bins_whose_light_the_iris_cuts_take_no_part():
+    """Three patches near the rim of the theatre's pupil: of one the ray through the lens' middle sees two thirds."""
+    scene = load_scene("theatre")
+    scene = scene.model_copy(update={"camera": scene.camera.with_columns(640), "spotlights": RIGS["triple"]})
+    at = Estimate(Pose.through(np.array([-1.477, 0.26, 4.117]), np.asarray(scene.instrument.rcm)), scene)
+    frame = Frame(np.zeros(scene.camera.shape, np.uint8), scene.sensor)
+    band = Ribbon.along(frame, at, side=1, inner=4.0, outer=4.0)
+    assert band is not None
+    assert seen_whole(scene.camera, band.pixels).all()
+    whole, shown = (
+        np.mean([by(scene.camera.project(scene.outline(at.pose, k, 90))).mean() for k in range(3)])
+        for by in (lambda q: seen_whole(scene.camera, q), scene.camera.shows)
+    )
+    assert band.covered == pytest.approx(whole, abs=0.02)
+    assert whole < shown - 0.1

@@ -5,13 +5,14 @@ import math
 import numpy as np
 import pytest
 
-from conespot.scene import Camera, InputError, Scene
+from conespot.scene import Camera, InputError, Scene, load_scene
 from conespot.scene.document import Document
 from conespot.scene.identity import identity
 from conespot.scene.lens import Lens
 from conespot.scene.optics import Optics
 from conespot.scene.point_spread import GaussianSpread, TabulatedSpread
 from conespot.scene.scene import read_scene
+from conespot.scene.vignetting import seen_whole
 from conespot.scene.words import assumed
 
 
@@ -115,3 +116,31 @@ def test_plans_and_tables_state_the_lens():
     words = assumed(Scene(camera=Camera(lens=lens)))["transfer"]
     assert words.endswith("behind a lens: aperture 10 mm, focus 0 mm, blur of sigma 5 um, glare 2 %")
     assert "lens" not in assumed(Scene())["transfer"]
+
+
+def test_a_pixel_is_seen_whole_where_the_iris_stops_no_ray_of_the_lens():
+    """Against rays through places all over the pupil's rim, half a pixel from the line between the two aside."""
+    camera = load_scene("theatre").camera.with_columns(480)
+    pixels = np.random.default_rng(0).uniform(0.0, camera.shape[::-1], (400, 2))
+    turn = np.linspace(0.0, 2.0 * np.pi, 48, endpoint=False)
+    places = camera.pupil / 2.0 * np.stack([np.cos(turn), np.sin(turn)], axis=1)
+
+    def stopped(beside):
+        at = np.broadcast_to(pixels + beside, (48, *pixels.shape))
+        return np.isnan(camera.rays(at, pupil=places[:, None]).directions[..., 0]).any(axis=0)
+
+    cut = [stopped(np.array(beside)) for beside in ((-0.5, -0.5), (0.5, -0.5), (-0.5, 0.5), (0.5, 0.5))]
+    sure = np.all(cut, axis=0) | ~np.any(cut, axis=0)
+    found = seen_whole(camera, pixels)
+    assert np.mean(sure) > 0.95
+    assert np.array_equal(found[sure], ~cut[0][sure])
+    assert 0.1 < np.mean(found) < 0.9
+    # the ray through the middle goes on farther
+    assert np.mean(camera.shows(pixels)) > np.mean(found) + 0.05
+
+
+def test_without_iris_or_aperture_every_pixel_is_seen_whole():
+    """Also those beyond the frame."""
+    pixels = np.array([[-50.0, 20.0], [300.0, 200.0]])
+    for camera in (Camera(resolution=400, lens=Lens(aperture=9.0)), Camera(resolution=400, optics=Optics())):
+        assert seen_whole(camera, pixels).all()
