@@ -13,6 +13,7 @@ from conespot.localize.distance import distance_of
 from conespot.localize.model.estimate import Estimate
 from conespot.localize.model.knowns import Knowns
 from conespot.localize.model.prior import rcm_miss
+from conespot.localize.model.smear import sag_sigma
 from conespot.localize.model.suspicion import WALL
 from conespot.localize.outcome import COVERED, OUTSIDE, UNCERTAIN, Localization, LocalizationFailure, Outcome
 from conespot.scene.scene import Scene
@@ -91,7 +92,7 @@ def judged(
         return LocalizationFailure(BEHIND)
     size = estimate.pose_size
     joint = covariance.copy()
-    joint[np.arange(3), np.arange(3)] += VERDICT.floor_mm**2
+    joint[np.arange(3), np.arange(3)] += VERDICT.floor_mm**2 + sag_sigma(nominal) ** 2
     joint[np.arange(3, size), np.arange(3, size)] += VERDICT.floor_rad**2
     pose = joint[:size, :size].copy()
     variances = np.diag(pose)

@@ -106,9 +106,19 @@ class Tremor(_Exposed):
 
         A sinusoid of rms a and angular frequency w has in a window T the mean variance a^2 (1 - sinc^2(w T / 2)).
         """
+        return self.rms * math.sqrt(float(np.mean(1.0 - np.square(np.sinc(self._rates() * exposure)))) / 3.0)
+
+    def sag(self, exposure: float) -> float:
+        """Standard deviation along an axis of how far the tip's mean place in an `exposure` [s] is off the middle one.
+
+        In mm. The way is bent: in a window T about t the mean of a sinusoid is sinc(w T / 2) times what it is at t.
+        """
+        return self.rms * math.sqrt(float(np.mean(np.square(1.0 - np.sinc(self._rates() * exposure)))) / 3.0)
+
+    def _rates(self) -> Array:
+        """Frequencies of its band [1/s]."""
         low, high = (self.frequency + sign * self.bandwidth / 2.0 for sign in (-1.0, 1.0))
-        rates = np.linspace(low, high, _WAVES)
-        return self.rms * math.sqrt(float(np.mean(1.0 - np.square(np.sinc(rates * exposure)))) / 3.0)
+        return np.linspace(low, high, _WAVES)
 
     def displacement(self, times: ArrayLike, seed: int = 0) -> Array:
         """How far the tip is off its planned place `[..., 3]` [mm] at times `[...]` [s]."""

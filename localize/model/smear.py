@@ -49,6 +49,15 @@ def smear_sigma(scene: Scene) -> float:
     return tremor.smear(exposure_of(tremor, scene.sensor)) if isinstance(tremor, Tremor) else 0.0
 
 
+def sag_sigma(scene: Scene) -> float:
+    """How far the tip's mean place in an exposure, which is what a frame shows, is off that in its middle [mm]; or 0.
+
+    Root mean square along an axis. A straight way has both in one place; a scene's tremor bends it.
+    """
+    tremor = scene.motion
+    return tremor.sag(exposure_of(tremor, scene.sensor)) if isinstance(tremor, Tremor) else 0.0
+
+
 def with_way(scene: Scene, entry: tuple[int, int], new: float) -> Scene:
     """The scene, which has a tremor, with another entry of its way's covariance [mm^2]."""
     way = way_covariance(scene)

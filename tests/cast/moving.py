@@ -40,12 +40,14 @@ class MovingNeedle:
         blur_mm=0.0,
         rig="single",
         emva=False,
+        beam=None,
+        instants=INSTANTS,
     ):
         blur_mm = 0.0057 if like_theatre else blur_mm
         lens = Lens(blur=GaussianSpread(sigma=blur_mm)) if blur_mm else None
         self.scene = Scene(
             camera=Camera(resolution=resolution, lens=lens),
-            beam=CyclesBeam(source_diameter=0.1 if like_theatre else 0.0),
+            beam=beam or CyclesBeam(source_diameter=0.1 if like_theatre else 0.0),
             spotlights=RIGS[rig],
             sensor=Emva(exposure_time=exposure_s or 0.001) if emva else Linear(white=1.0, bits=12),
             motion=Tremor(rms=0.18, exposure=None if emva else exposure_s) if exposure_s else None,
@@ -53,6 +55,7 @@ class MovingNeedle:
         # what lights an instant is not smeared: the mean of a tremor is in a scene that has one
         self._still = self.scene.model_copy(update={"motion": None})
         self.exposure_s = exposure_s
+        self._instants = instants if exposure_s else 1
         self._rng = np.random.default_rng(seed)
         # planes that are shifted at random: new ones for each frame take longer than all else
         spread = 1.0 if emva else noise
@@ -75,7 +78,7 @@ class MovingNeedle:
         signal = self._ambient.copy()
         if not dark:
             # the middles of equal parts of the exposure
-            parts = (np.arange(INSTANTS) + 0.5) / INSTANTS - 0.5 if self.exposure_s else np.zeros(1)
+            parts = (np.arange(self._instants) + 0.5) / self._instants - 0.5
             for instant in parts * self.exposure_s + time:
                 pose = Pose.through(self.tip(instant), self.scene.instrument.rcm)
                 rows, columns = self._reached(pose)

@@ -2,11 +2,13 @@
 
 import numpy as np
 import pytest
+from moving import MovingNeedle
 from photographs import AMBIENT, NOISE, PEAK, READ, WHITE, cast, scene_of, spotlight
+from scipy.stats import binom, chi2
 
 from conespot.localize import Knowns, locate
 from conespot.localize.model.quantity import QUANTITIES
-from conespot.localize.model.smear import smear_sigma, way_covariance
+from conespot.localize.model.smear import sag_sigma, smear_sigma, way_covariance
 from conespot.scene.beam import CyclesBeam, HardBeam
 from conespot.scene.motion import Tremor
 from conespot.scene.pose import Pose
@@ -52,6 +54,30 @@ def test_a_tremors_smear_is_what_its_way_scatters_in_the_mean():
     # short against its waves it is a steady velocity
     speed = 2.0 * np.pi * TREMOR.rms / np.sqrt(3.0) * np.sqrt(81.0 + 4.0 / 12.0)
     assert TREMOR.smear(1e-3) == pytest.approx(speed * 1e-3 / np.sqrt(12.0), rel=1e-3)
+
+
+def test_a_tremors_sag_is_how_far_its_mean_place_is_off_the_middle_one():
+    ways = [TREMOR.sway(time, 0.02, seed=2) for time in np.arange(0.0, 60.0, 0.0731)]
+    # both ends of a way count as half
+    means = np.array([np.trapezoid(way, axis=0) / (len(way) - 1) for way in ways])
+    np.testing.assert_allclose(np.mean(np.square(means), axis=0), TREMOR.sag(0.02) ** 2, rtol=0.1)
+    assert sag_sigma(Scene(motion=TREMOR)) == TREMOR.sag(EXPOSURE)
+    assert sag_sigma(Scene()) == 0.0
+
+
+@pytest.mark.slow
+def test_a_tremors_bent_way_is_in_its_tips_ellipsoids():
+    """With the mean place taken for the middle one, 25 of 40 are inside."""
+    needle = MovingNeedle(500, seed=1, exposure_s=EXPOSURE, blur_mm=0.0057, emva=True, beam=HardBeam(), instants=24)
+    rng, inside, scene = np.random.default_rng(5), 0, needle.scene
+    for time in rng.uniform(0.0, 100.0, 40):
+        rcm = tuple(map(float, np.asarray(scene.instrument.rcm) + 0.05 * rng.standard_normal(3)))
+        told = scene.model_copy(update={"instrument": scene.instrument.model_copy(update={"rcm": rcm})})
+        found = locate(needle.frame(float(time)), told, "photometric")
+        assert found, found.reason
+        off = found.apex_mm - needle.tip(time)
+        inside += off @ np.linalg.solve(found.covariance[:3, :3], off) < chi2.ppf(0.95, 3)
+    assert inside >= binom.ppf(0.005, 40, 0.95)
 
 
 def test_what_is_known_of_a_way_are_the_moments_of_a_gaussian_velocity():
