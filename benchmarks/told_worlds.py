@@ -1,10 +1,11 @@
 """Every effect of `campaigns/reality.yaml`, and what becomes of answers by what a localizer is told of it.
 
 `python benchmarks/told_worlds.py ROWS.csv` renders frames with each effect alone and with all of them (`theatre`), and
-has `photometric` find their tips, told rightly, told wrongly (`WRONG` says how) and told nothing: that the world is
-`theatre-ideal`, its light and camera apart. The RCM is told with an error of 0.05 mm along each axis, which is also its
-sigma. `--poses N` frames a cell, `--columns N` px, `--effects` by name. What is in ROWS.csv is not measured again, so
-that the command can be stopped and given again with more poses. Printed: the matrix of docs/localizers.md.
+has `photometric` find their tips, told rightly, told wrongly (`WRONG` says how), wrongly but with its sigma (`SIGMAS`)
+and told nothing: that the world is `theatre-ideal`, its light and camera apart. The RCM is told with an error of 0.05
+mm along each axis, which is also its sigma. `--poses N` frames a cell, `--columns N` px, `--effects` by name. What is
+in ROWS.csv is not measured again, so that the command can be stopped and given again with more poses. Printed: the
+matrix of docs/localizers.md.
 """
 
 from __future__ import annotations
@@ -22,7 +23,7 @@ import numpy as np
 from scipy.stats import binom, chi2
 
 from conespot.campaigns.schema import combinations, read_campaign
-from conespot.localize import Localization, locate
+from conespot.localize import Knowns, Localization, locate
 from conespot.render import Exposure, Renderer
 from conespot.scene import Pose, Scene
 
@@ -57,7 +58,9 @@ WRONG: dict[str, dict[str, Any]] = {
 }  # fmt: skip
 #: the light of an effect that the white LED does not show
 LIGHTS = {"tissue": "infrared"}
-TOLD = ("rightly", "wrongly", "nothing")
+TOLD = ("rightly", "wrongly", "wrongly, with its sigma", "nothing")
+#: what localizers may assume of what they are told wrongly, where a sigma exists for it
+SIGMAS = {"aslant": Knowns(camera_tilt_sigma_deg=1.0)}
 COLUMNS = ("effect", "told", "pose", "columns", "error_um", "axis_deg", "chi2", "reason")
 RCM_MM = 0.05
 
@@ -90,6 +93,8 @@ def worlds(columns: int) -> Iterator[World]:
         told = {"rightly": true}
         if name in WRONG:
             told |= {"wrongly": scene(WRONG[name], light), "nothing": scene({}, light)}
+        if name in SIGMAS:
+            told["wrongly, with its sigma"] = told["wrongly"]
         yield World(name, true, told)
 
 
@@ -106,7 +111,8 @@ def measured(world: World, renderer: Renderer, number: int, columns: int) -> Ite
         rcm = tuple(map(float, np.asarray(believed.instrument.rcm) + off))
         given = believed.model_copy(update={"instrument": believed.instrument.model_copy(update={"rcm": rcm})})
         row = {"effect": world.effect, "told": told, "pose": number, "columns": columns}
-        found = locate(image, given, "photometric")
+        knowns = SIGMAS[world.effect] if told.endswith("sigma") else None
+        found = locate(image, given, "photometric", knowns=knowns)
         if isinstance(found, Localization):
             miss = found.apex_mm - pose.apex
             assert found.covariance is not None

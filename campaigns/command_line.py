@@ -162,6 +162,7 @@ def _add_own(add: _Add) -> None:
     calibrate.add_argument("frames", type=Path, nargs="+", metavar="FRAMES", help="images, folders of images, videos")
     calibrate.add_argument("--scene", required=True, help="the YAML file that describes the microscope so far")
     calibrate.add_argument("--out", type=Path, required=True, metavar="FILE", help="the scene's file to write")
+    calibrate.add_argument("--tilt", action="store_true", help="find which way the camera's axis leans, too")
     calibrate.add_argument("--shape", action="store_true", help="find the retina's semi-axes in place of its radius")
     add_set(localize)
     add_set(track)

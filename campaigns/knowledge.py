@@ -43,6 +43,10 @@ else:
     AngleSigma = _sigma("angle", Angle)  #: [rad], None if free
 
 
+def _degrees(angle: float | None) -> float | None:
+    return None if angle is None else math.degrees(angle)
+
+
 class Knowledge(Model):
     """Errors (standard deviations of what is told) and sigmas (what a localizer may assume); `free` is not known.
 
@@ -61,6 +65,7 @@ class Knowledge(Model):
     eye_radius_sigma: LengthSigma = 0.0
     camera_height_error: Length = Field(0.0, ge=0.0)
     camera_height_sigma: LengthSigma = 0.0
+    camera_tilt_sigma: AngleSigma = 0.0
     semi_axes_sigma: LengthSigma = 0.0
     relief_sigma: Length = Field(0.0, ge=0.0)
     deep_amount_sigma: Annotated[float, Field(ge=0.0)] | Literal["usual"] = "usual"
@@ -89,12 +94,12 @@ class Knowledge(Model):
     @property
     def knowns(self) -> Knowns:
         """What a localizer may assume of the scene that it is told."""
-        angle = self.half_angle_sigma
         return Knowns(
             rcm_sigma_mm=self.rcm_sigma,
-            half_angle_sigma_deg=None if angle is None else math.degrees(angle),
+            half_angle_sigma_deg=_degrees(self.half_angle_sigma),
             eye_radius_sigma_mm=self.eye_radius_sigma,
             camera_height_sigma_mm=self.camera_height_sigma,
+            camera_tilt_sigma_deg=_degrees(self.camera_tilt_sigma),
             semi_axes_sigma_mm=self.semi_axes_sigma,
             relief_sigma_mm=self.relief_sigma,
             deep_amount_sigma=self.deep_amount_sigma,

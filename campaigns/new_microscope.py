@@ -157,6 +157,7 @@ def _lines(path: Path, answers: Mapping[str, str]) -> Iterator[str]:
     yield f"  rcm_sigma: {answers['trocar-sigma']} # or free"
     yield "  #half_angle_sigma: 0.01 deg"
     yield "  #eye_radius_sigma: 0.3 mm"
+    yield "  #camera_tilt_sigma: 1 deg"
     yield "  #relief_sigma: 0.05 mm # by which bumps nobody measured may raise the wall; for the distance alone"
 
 

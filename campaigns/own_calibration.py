@@ -17,6 +17,7 @@ from conespot.localize.calibration import NAMES, QUANTITIES, Calibration, Width,
 from conespot.localize.deep_light import DEEP, SharedDeep, shared_deep
 from conespot.localize.frames.reader import read_frames
 from conespot.localize.model.deep import Deep
+from conespot.localize.settled_fits import Begun
 from conespot.scene import InputError, Scene
 from conespot.scene.atomic import write_atomically
 from conespot.scene.document import Document, dump, find_document, read_value
@@ -31,24 +32,30 @@ _REMEDIES = {
     "softness": "frames whose patch is not clipped, near and far",
     "eye_radius": "tips 5 mm apart all over the retina, or the eye's axial length by biometry",
     "camera_height": "an object of known size in the eye, since no frame tells how large the whole scene is",
+    "camera_tilt": "patches over all of the retina, or OpenCV's calibration of the microscope with its attitude",
     "retina": "tips 5 mm apart all over the retina, or OCT of it",
     "deep": "frames without clipped light, of hard-edged patches on several places of the same retina",
     "rcm": "tips further apart to the sides and in height: their axes meet in the RCM",
 }
 #: what no sequence is asked about, and who says it
-_NEVER = "camera's tilt, azimuth and lens: take OpenCV's calibration of the microscope as camera: {calibration: FILE}"
+_NEVER = "camera's lens: take OpenCV's calibration of the microscope as camera: {calibration: FILE}"
+#: what is asked about only with an option
+_UNASKED = "camera's tilt: give --tilt to have it asked for"
 _EXACT_MM = 1e-9
 #: kinds of quantities by the unit of a sigma
 _KINDS = {"deg": "angle", "mm": "length"}
 _WIDTH = 110
+#: how far a camera may lean otherwise than told, towards +x and towards +y [deg]
+_TILT_DEG = 2.0
 
 
 def calibrate_own(
-    sources: Sequence[Path], name: str, settings: Sequence[str], out: Path, *, shape: bool
+    sources: Sequence[Path], name: str, settings: Sequence[str], out: Path, *, shape: bool, tilt: bool
 ) -> Iterator[str]:
     """Calibrate a scene from frames and write it with its knowledge; what was found, a line a quantity.
 
-    With `shape` the retina's semi-axes are found in place of the eye's radius. Raises InputError for a scene or frames
+    With `shape` the retina's semi-axes are found in place of the eye's radius, with `tilt` which way the camera leans,
+    too. Raises InputError for a scene or frames
     that cannot be used, fewer than three frames in which the patch can be measured, and a file that cannot be written.
     """
     can_hold(out, "--out")
@@ -59,13 +66,17 @@ def calibrate_own(
     width = Width()
     if shape:
         width = replace(width, eye_radius_mm=_EXACT_MM, semi_axes_mm=SEMI_AXES_SIGMA_MM)
-    found = calibrate(lambda: (frame.image for frame in read_frames(sources, scene)), scene, width=width)
+    if tilt:
+        width = replace(width, camera_tilt_deg=_TILT_DEG)
+    # read again each time, since a video need not fit into memory; but the needle is searched for once
+    begun = Begun(lambda: (frame.image for frame in read_frames(sources, scene)))
+    found = calibrate(begun, scene, width=width)
     calibrated = found.applied(scene)
-    blur = shared_blur((frame.image for frame in read_frames(sources, scene)), calibrated)
+    blur = shared_blur(begun, calibrated)
     calibrated = calibrated if blur is None else blur.applied(calibrated)
-    deep = shared_deep((frame.image for frame in read_frames(sources, scene)), calibrated)
-    said = [*_said(found), *_said_of_blur(blur), *_said_of_deep(deep, calibrated)]
-    said += [*found.correlations().splitlines(), f"not asked: {_NEVER}"]
+    deep = shared_deep(begun, calibrated)
+    said = [*_said(found), *_said_of_blur(blur), *_said_of_deep(deep, calibrated), *found.correlations().splitlines()]
+    said += [f"not asked: {words}" for words in ([] if tilt else [_UNASKED]) + [_NEVER]]
     calibrated = calibrated if deep is None else deep.applied(calibrated)
     text = _file(calibrated, _known(knowledge, found, deep, width), found, said)
     read_scene(Document(str(out), _without_knowledge(text, out), folder=out.parent))  # what is written can be read
@@ -115,11 +126,12 @@ def _file(scene: Scene, known: dict[str, object], found: Calibration, said: Sequ
 def _known(knowledge: Knowledge, found: Calibration, deep: SharedDeep | None, width: Width) -> dict[str, object]:
     """The sigmas of a scene's file: what was found as well as it was, the rest as well as it was known before."""
     known = {key: value for key, value in knowledge.model_dump(mode="json").items() if key.endswith("_sigma")}
+    worst: dict[str, float] = {}  # of all quantities that one key is about
     for quantity, sigma in zip(QUANTITIES, found.sigmas, strict=False):
         field = _field(quantity.known)
         if found.observable[quantity.name] and field in known:
-            rounded = float(f"{sigma:.3g}")
-            known[field] = format_quantity(rounded, _KINDS[quantity.unit]) if quantity.unit else rounded
+            worst[field] = max(worst.get(field, 0.0), float(f"{sigma:.3g}"))
+            known[field] = format_quantity(worst[field], _KINDS[quantity.unit]) if quantity.unit else worst[field]
     if all(found.observable[name] for name in NAMES[-3:]):
         sideways = math.hypot(width.play_mm, float(max(found.sigmas[-3:])))
         known["rcm_sigma"] = format_quantity(float(f"{sideways:.3g}"), "length")

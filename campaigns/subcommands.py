@@ -187,7 +187,8 @@ def calibrate(options: argparse.Namespace) -> Ending:
     """Calibrate a scene from frames of one's own."""
     from conespot.campaigns.own_calibration import calibrate_own
 
-    for line in calibrate_own(options.frames, options.scene, options.set, options.out, shape=options.shape):
+    asked = {"shape": options.shape, "tilt": options.tilt}
+    for line in calibrate_own(options.frames, options.scene, options.set, options.out, **asked):
         _say(line)
     return Ending.DONE
 

@@ -16,7 +16,7 @@ from conespot.localize.image import AnyImage
 from conespot.localize.model.knowns import Knowns
 from conespot.localize.model.noise import NoiseModel
 from conespot.localize.model.quantity import quantity
-from conespot.localize.settled_fits import settled_fits
+from conespot.localize.settled_fits import Begun
 from conespot.scene.scene import Scene
 
 #: standard deviations of the squared width that one must have to be seen; a bound of 95 % on what is not
@@ -56,11 +56,11 @@ class SharedBlur:
         return quantity("blur").write(scene, self.variance) if self.observable else scene
 
 
-def shared_blur(frames: Iterable[AnyImage], scene: Scene, noise: NoiseModel | None = None) -> SharedBlur | None:
+def shared_blur(frames: Begun | Iterable[AnyImage], scene: Scene, noise: NoiseModel | None = None) -> SharedBlur | None:
     """The blur of checked frames of one scene, whose poses are not known; None where fewer than three show an edge."""
     blur, knowns = quantity("blur"), Knowns(blur_sigma_mm=None).within(scene)
     found = []
-    for fit in settled_fits(frames, scene, knowns, noise):
+    for fit in Begun.of(frames).settled_fits(scene, knowns, noise):
         at = fit.estimate.pose_size + fit.knowns.free.index(blur) if blur in fit.knowns.free else -1
         if at >= 0 and 0.0 < fit.covariance[at, at] < math.inf:
             found.append((blur.value(fit.estimate.scene), float(fit.covariance[at, at])))

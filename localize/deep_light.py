@@ -20,7 +20,7 @@ from conespot.localize.model.knowns import DEEP_SIGMA, Knowns
 from conespot.localize.model.noise import NoiseModel
 from conespot.localize.model.quantity import quantity
 from conespot.localize.model.solve import inverse
-from conespot.localize.settled_fits import settled_fits
+from conespot.localize.settled_fits import Begun
 from conespot.scene.retina import LEAST_DEEP, MOST_DEEP
 from conespot.scene.scene import Scene
 
@@ -70,7 +70,7 @@ class SharedDeep:
         return scene
 
 
-def shared_deep(frames: Iterable[AnyImage], scene: Scene, noise: NoiseModel | None = None) -> SharedDeep | None:
+def shared_deep(frames: Begun | Iterable[AnyImage], scene: Scene, noise: NoiseModel | None = None) -> SharedDeep | None:
     """The deep light of checked frames of one retina, whose poses are not known.
 
     None where the scene has no deep light, and where fewer than three frames show an edge.
@@ -80,7 +80,7 @@ def shared_deep(frames: Iterable[AnyImage], scene: Scene, noise: NoiseModel | No
     knowns = Knowns().within(scene)
     nominal, prior = np.array([each.value(scene) for each in DEEP]), np.eye(2) / DEEP_SIGMA**2
     values, told, pulls = [], [], []
-    for fit in settled_fits(frames, scene, knowns, noise):
+    for fit in Begun.of(frames).settled_fits(scene, knowns, noise):
         at = [fit.estimate.pose_size + fit.knowns.free.index(each) for each in DEEP]
         here = np.array([each.value(fit.estimate.scene) for each in DEEP])
         # all that the frame says less the prior, which all frames have only once

@@ -56,7 +56,7 @@ def locate_together(
             raise InputError(
                 f"images: the scene has no camera '{name}'; its cameras: {', '.join(scene.cameras) or 'none'}"
             )
-    common = [each.name for each in known.free if each.name != "camera_height"]
+    common = [each.name for each in known.free if not each.name.startswith("camera_")]
     if common:
         raise InputError(f"knowns: {', '.join(common)} would be another one for each camera; hold it exactly")
     outcomes = [

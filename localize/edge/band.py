@@ -100,6 +100,20 @@ class BandFit(EdgeFit):
         scores, parts, known = self._strips(self.channels, self.prior)
         return score_covariance(self.channels[0].strips, scores, parts) + known
 
+    def without_profile(self, sigma: float) -> tuple[Array, Array]:
+        """Information `[P, P]` and gradient `[P]` that are lost if the profile across the outlines is not known.
+
+        Then the mean log light at each whole distance from them may be off by `sigma`.
+        """
+        size = len(self.information)
+        information, gradient = np.zeros((size, size)), np.zeros(size)
+        for channel in self.channels:
+            for sign, part in ((1.0, channel.eliminated(size)), (-1.0, channel.eliminated(size, sigma))):
+                reduced = reduction(part.information, size)
+                information += sign * reduced @ part.information @ reduced.T
+                gradient += sign * reduced @ part.gradient
+        return information, gradient
+
     def suspicions(self, nominal: Scene) -> dict[str, float]:
         """Scores of beam and wall where the fit stands, over their sigmas."""
         knowns, pose_size = self.knowns, self.estimate.pose_size

@@ -96,15 +96,26 @@ class Nuisances:
         spreads = [self.slow_spread] if self.strips.odds is None else [self.slow_spread, *2 * [self.slow_level]]
         return np.concatenate([[gain, 1e-9], np.repeat(np.array(spreads) ** -2, len(self.slow) // len(spreads))])
 
-    def eliminated(self, size: int) -> Eliminated:
-        """The normal equations of `size` shared parameters, gain, level and slow slopes, the strips' own eliminated."""
+    def eliminated(self, size: int, profile: float | None = None) -> Eliminated:
+        """The normal equations of `size` shared parameters, gain, level and slow slopes, the strips' own eliminated.
+
+        With a `profile` the mean log light at each whole distance from the outlines joins them, so far not known [1].
+        """
         data = self.residual + self.strips.log_albedo(self.levels)
-        part = Eliminated.of(self.strips, self.jacobian, data, self.weights, self.spread)
-        own = range(size, len(part.gradient))
-        part.information[own, own] += self.precision
-        part.gradient[size + 2 :] -= self.precision[2:] * self.slow
+        jacobian, precision = self.jacobian, self.precision
+        if profile is not None:
+            distance = np.round(self.strips.offset)
+            jacobian = np.concatenate([jacobian, distance == np.unique(distance)[:, None]])
+        part = Eliminated.of(self.strips, jacobian, data, self.weights, self.spread)
+        last = size + len(precision)
+        own = range(size, last)
+        part.information[own, own] += precision
+        part.gradient[size + 2 : last] -= precision[2:] * self.slow
         if self.told is not None:
-            part.gradient[size] -= self.precision[0] * (self.gain - self.told[0])
+            part.gradient[size] -= precision[0] * (self.gain - self.told[0])
+        if profile is not None:
+            across = range(last, len(part.gradient))
+            part.information[across, across] += profile**-2
         return part
 
     def scores(self) -> tuple[Array, Array]:

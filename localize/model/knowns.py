@@ -47,6 +47,7 @@ class Knowns:
     camera_height_sigma_mm: float | None = 0.0
     #: of each of the retina's semi-axes: `scene.population.SEMI_AXES_SIGMA_MM` about the mean eye for an unknown one
     semi_axes_sigma_mm: float | None = 0.0
+    camera_tilt_sigma_deg: float | None = 0.0  #: of how far the camera's axis leans, towards +x and towards +y each
     #: how far the wall may be raised or sunk at any place beside what the scene's surface says [mm]: bumps nobody
     #: measured, a height map's error. No fit sees it; the distance from the wall does
     relief_sigma_mm: float = 0.0

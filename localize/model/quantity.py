@@ -68,6 +68,31 @@ def _semi_axis(name: str, along: int) -> Quantity:
     return Quantity(name, read, write, changes="sight", step=1e-3, known="semi_axes_sigma_mm", unit="mm")
 
 
+def _tilt(name: str, along: int) -> Quantity:
+    """How far the camera's axis leans towards +x or +y [rad]; no azimuth, which an upright camera does not have."""
+
+    def leaning(scene: Scene) -> list[float]:
+        camera = scene.camera
+        return [camera.tilt * math.cos(camera.azimuth), camera.tilt * math.sin(camera.azimuth)]
+
+    def write(scene: Scene, new: float) -> Scene:
+        lean = leaning(scene)
+        lean[along] = new
+        update = {"tilt": math.hypot(*lean), "azimuth": math.atan2(lean[1], lean[0])}
+        return scene.model_copy(update={"camera": scene.camera.model_copy(update=update)})
+
+    return Quantity(
+        name,
+        read=lambda scene: leaning(scene)[along],
+        write=write,
+        changes="sight",
+        step=1e-4,
+        known="camera_tilt_sigma_deg",
+        per_unit=math.radians(1.0),
+        unit="deg",
+    )
+
+
 def _with_spread(scene: Scene, **values: float) -> Scene:
     spread = scene.spread
     assert spread is not None
@@ -184,6 +209,8 @@ QUANTITIES = (
     _semi_axis("retina_width", 0),
     _semi_axis("retina_height", 1),
     _semi_axis("retina_length", 2),
+    _tilt("camera_tilt_x", 0),
+    _tilt("camera_tilt_y", 1),
     # both as logarithms: a factor is as likely as its inverse
     Quantity(
         name="deep_amount",

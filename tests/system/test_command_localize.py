@@ -141,6 +141,7 @@ def test_what_a_sequence_does_not_show_stays_as_it_was_and_is_said_with_what_wou
     for name in ("half_angle", "camera_height", "rcm_z"):
         assert f"{name}: not observable" in said
     assert "what would show it: an object of known size" in said
+    assert "not asked: camera's tilt: give --tilt to have it asked for" in said
     assert "deep light: the scene has none; to have it asked for, give the scene retina: " in said
     assert found.instrument.rcm[2] == 22.0
     assert found.beam.half_angle == pytest.approx(math.radians(9.0))
@@ -153,11 +154,13 @@ def test_what_a_sequence_does_not_show_stays_as_it_was_and_is_said_with_what_wou
 
 @pytest.mark.slow
 def test_three_spotlights_give_the_half_angle_back_and_the_next_command_takes_it(own, tmp_path):
-    """Told 9 deg, which are 9.03; four frames of 500 px, within four of the sigmas that are stated."""
+    """Told 9 deg, which are 9.03, and upright; four frames of 500 px, within four of the sigmas that are stated."""
     scene = scene_of(HardBeam(half_angle=math.radians(9.03)), "triple", resolution=500)
-    found, text = calibrated(tmp_path, own, scene, "--set", "scene.spotlights=triple", rays=8)
+    found, text = calibrated(tmp_path, own, scene, "--set", "scene.spotlights=triple", "--tilt", rays=8)
     assert math.degrees(found.beam.half_angle) == pytest.approx(9.03, abs=5e-3)
     assert "half_angle_sigma: 0 deg" not in text
+    assert "camera_tilt_sigma: 0 deg" not in text
+    assert found.camera.tilt < math.radians(0.3)
     assert main(["localize", str(tmp_path / "0.png"), "--scene", str(tmp_path / "calibrated.yaml")]) == 0
 
 

@@ -7,8 +7,9 @@ import pytest
 from moving import MovingNeedle
 from photographs import NOISE, fundus, photograph, scene_of
 
+from conespot.localize import Knowns, locate
 from conespot.localize.blur import shared_blur
-from conespot.localize.calibration import NAMES, Calibration, calibrate
+from conespot.localize.calibration import NAMES, Calibration, Width, calibrate
 from conespot.localize.model.quantity import quantity
 from conespot.scene.beam import CyclesBeam, HardBeam
 
@@ -48,12 +49,37 @@ def test_one_spotlight_tells_neither_half_angle_nor_camera_height_and_says_so():
     poses = [true.pose(np.array([2.0 * math.sin(t), 2.0 * math.cos(t), 2.5 + 0.4 * t])) for t in range(6)]
     frames = [photograph(true, pose, seed=i, rays=6) for i, pose in enumerate(poses)]
     found = calibrate(lambda: frames, believed, noise=NOISE)
-    truth = np.array([math.radians(9.03), 0.0, 12.0, 110.0, 12.0, 12.0, 12.0, 6.05, -0.04, 22.1])
+    truth = np.array([math.radians(9.03), 0.0, 12.0, 110.0, 12.0, 12.0, 12.0, 0.0, 0.0, 6.05, -0.04, 22.1])
     assert np.all(np.abs(found.values - truth) < 4.0 * found.sigmas)
     assert not found.observable["half_angle"]
     assert not found.observable["camera_height"]
     assert found.applied(believed).camera == believed.camera
     assert "softness" not in found.statement()
+
+
+def test_a_microscope_that_leans_is_found_and_an_answer_that_knows_it_may_lean_holds_its_tip():
+    """One degree, told none, on frames of one spotlight, of whose half angle nothing false is claimed."""
+    told = scene_of(HardBeam(), resolution=400)
+    true = told.model_copy(
+        update={"camera": told.camera.model_copy(update={"tilt": math.radians(1.0), "azimuth": 0.5})}
+    )
+    poses = [true.pose(np.array([2.5 * math.sin(1.7 * t), 2.5 * math.cos(1.7 * t), 2.5 + 0.4 * t])) for t in range(6)]
+    frames = [photograph(true, pose, seed=i, rays=8) for i, pose in enumerate(poses)]
+    found = calibrate(lambda: frames, told, width=Width(camera_tilt_deg=2.0), noise=NOISE)
+    camera = found.applied(told).camera
+    for name, value in (("camera_tilt_x", math.cos(0.5)), ("camera_tilt_y", math.sin(0.5))):
+        at = NAMES.index(name)
+        assert found.observable[name]
+        assert abs(found.values[at] - math.radians(value)) < 3.0 * found.sigmas[at]
+        assert quantity(name).read(told.model_copy(update={"camera": camera})) == pytest.approx(found.values[at])
+    assert abs(found.values[0] - math.radians(9.0)) < 4.0 * found.sigmas[0]
+    sure, unsure = (
+        locate(frames[1], told, "cone", noise=NOISE, knowns=Knowns(camera_tilt_sigma_deg=sigma)) for sigma in (0.0, 1.0)
+    )
+    off = [one.apex_mm - poses[1].apex for one in (sure, unsure)]
+    squares = [o @ np.linalg.solve(one.covariance[:3, :3], o) for o, one in zip(off, (sure, unsure), strict=True)]
+    assert squares[0] > 100.0
+    assert squares[1] < 16.0
 
 
 @pytest.mark.parametrize("blur_mm", [0.0, 0.06])
@@ -68,9 +94,9 @@ def test_a_sequence_shows_the_lens_blur_that_its_scene_does_not_tell_and_claims_
 
 
 def test_quantities_that_a_sequence_confounds_are_said_and_those_that_it_does_not_show_are_not():
-    covariance = np.diag(np.square([1e-3, 1e-9, 0.01, 0.1, 1e-9, 1e-9, 1e-9, 0.01, 0.01, 0.02]))
+    covariance = np.diag(np.square([1e-3, 1e-9, 0.01, 0.1, 1e-9, 1e-9, 1e-9, 1e-9, 1e-9, 0.01, 0.01, 0.02]))
     covariance[0, 2] = covariance[2, 0] = -0.9 * 1e-3 * 0.01
     covariance[0, 3] = covariance[3, 0] = 0.8 * 1e-3 * 0.1
     shown = {name: name != "camera_height" for name in NAMES}
-    found = Calibration(np.zeros(10), covariance, shown, 5)
+    found = Calibration(np.zeros(12), covariance, shown, 5)
     assert found.correlations() == "half_angle and eye_radius: correlation -0.90"
