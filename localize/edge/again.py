@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from conespot.localize.edge.band import BandFit
 from conespot.localize.edge.channel import Channel, Kept
 from conespot.localize.edge.fit import is_sharp
+from conespot.localize.edge.ground import Ground
 from conespot.localize.edge.quick import QuickBeam, QuickLight
 from conespot.localize.edge.rim import Rim
 from conespot.localize.edge.settings import EDGE
@@ -23,11 +24,9 @@ from conespot.localize.edge.strips import Strips, score_covariance
 from conespot.localize.image import Frame
 from conespot.localize.model.deep import Deep
 from conespot.localize.model.estimate import Estimate
-from conespot.localize.model.forward import ambient_irradiance
 from conespot.localize.model.knowns import Knowns
 from conespot.localize.model.noise import NoiseModel
 from conespot.localize.model.prior import prior_rows
-from conespot.localize.model.sight import look
 from conespot.localize.model.solve import inverse, limited, reduction, solved
 from conespot.localize.model.view import Shown, outline
 from conespot.scene.scene import Scene
@@ -47,6 +46,11 @@ class AgainSettings:
     enough: float = 2.0
     #: and before a blur is sought
     there: float = 0.5
+    #: a step this short is followed by ones with the slopes where it began, as long as each is this much shorter than
+    #: the one before, and no weights change by more than this factor
+    near: float = 30.0
+    shorter: float = 0.3
+    reweighed: float = 1.5
     #: points of the outline
     points: int = 64
     #: share of a band's bins that may be clipped: a glint, not the patch
@@ -71,6 +75,7 @@ class Carried:
     #: covariance of the gradient in units of the information's Cholesky factor `[5, 5]`
     together: Array
     blur: float | None  #: variance of a blur beyond the scene's [mm^2]; None while none is sought
+    ground: Ground
 
     @classmethod
     def after(cls, fit: BandFit, width: float) -> Carried | None:
@@ -78,7 +83,9 @@ class Carried:
         information = fit.information[:_POSE, :_POSE]
         # what else was free is as it was found, or told by the track
         together = _whitened(information, fit.scatter()[:_POSE, :_POSE])
-        return None if together is None else cls(tuple(map(Kept.of, fit.channels)), width, together, None)
+        if together is None:
+            return None
+        return cls(tuple(map(Kept.of, fit.channels)), width, together, None, Ground(fit.estimate.scene))
 
 
 @dataclass(frozen=True, eq=False)
@@ -118,16 +125,17 @@ def fit_again(
     shown = [plane.at(*rim.cells) for plane in Shown.each(frame, rim.window)]
     if any(np.count_nonzero(plane.usable) < (1.0 - AGAIN.clipped) * len(plane.usable) for plane in shown):
         return None
-    sight = look(scene, rim.pixels, side)
+    sight, irradiance = before.ground.under(rim.window, rim.cells)
     beam = QuickBeam(sight, start)
     here = beam(start.pose, before.blur or 0.0)
     if not np.all(np.isfinite(here.value)):
         return None
     strips = Strips(rim.index, here.offset(start.profile.half_angle), rim.first, (slice(0, len(rim.first)),))
     channels = [
-        Channel(plane, strips, noise, side**2, was, _ALL) for plane, was in zip(shown, before.channels, strict=True)
+        Channel(plane, strips, noise, irradiance, was, pixels=side**2, size=_ALL)
+        for plane, was in zip(shown, before.channels, strict=True)
     ]
-    fit = _Fit(beam, channels, ambient_irradiance(sight, scene), knowns, start, before.blur or 0.0, here)
+    fit = _Fit(beam, channels, knowns, start, before.blur or 0.0, here)
     if not fit.run(before):
         return None
     information = fit.of_pose
@@ -137,7 +145,8 @@ def fit_again(
         together = (1.0 - AGAIN.fresh) * together + AGAIN.fresh * newer
     misfit = math.sqrt(sum(channel.misfit**2 for channel in channels) / len(channels))
     contrast = min(channel.contrast for channel in channels)
-    carried = Carried(tuple(channel.leave() for channel in channels), fit.here.width * side, together, fit.kept_blur)
+    kept = tuple(channel.leave() for channel in channels)
+    carried = Carried(kept, fit.here.width * side, together, fit.kept_blur, before.ground)
     return Again(fit.at, _coloured(information, together), misfit, contrast, carried)
 
 
@@ -147,7 +156,6 @@ class _Fit:
 
     beam: QuickBeam
     channels: list[Channel]
-    irradiance: Array
     knowns: Knowns
     at: Estimate
     blur: float  #: variance beyond the scene's [mm^2]
@@ -157,31 +165,59 @@ class _Fit:
 
     def run(self, before: Carried) -> bool:
         """Whether it settles."""
-        scene, self.sought = self.at.scene, before.blur is not None
+        self.sought = before.blur is not None
+        length, shorter = math.inf, 0.0
         for turn in range(AGAIN.steps):
-            if turn:
-                self.here = self.beam(self.at.pose, self.blur)
-            pr, pj = prior_rows(self.at, scene, self.knowns)
-            self.prior = np.zeros((len(pj), _ALL))
-            self.prior[:, :_POSE] = pj
-            information, gradient = self.prior.T @ self.prior, -self.prior.T @ pr
-            for channel in self.channels:
-                more, slope = channel.equations(self.irradiance, self.here.value, self.here.rows)
-                information += more
-                gradient += slope
-            self.information = information
+            # after a short step the next ones take the slopes that there are, as long as they get shorter
+            anew = length > AGAIN.near or shorter > AGAIN.shorter or not self._weighed
+            gradient = self._linearized(turn) if anew else self._corrected()
             step = self._step(gradient)
             if step is None:
                 return False
             for channel in self.channels:
                 channel.learn(step)
-            length = math.sqrt(float(step @ information @ step))
-            if turn and length < AGAIN.enough:
+            before_it, length = length, math.sqrt(float(step @ self.information @ step))
+            shorter = 0.0 if anew else length / before_it
+            if turn and length < AGAIN.enough and self._weighed:
                 if self.sought or not self._doubted(gradient):
+                    self.information = self.information * self._heavier
                     return True
                 # far from the minimum a width stands for a place
                 self.sought = length < AGAIN.there
         return False
+
+    @property
+    def _heavier(self) -> float:
+        """The last weights over those of the last equations."""
+        return sum(channel.heavier for channel in self.channels) / len(self.channels)
+
+    @property
+    def _weighed(self) -> bool:
+        return 1.0 / AGAIN.reweighed < self._heavier < AGAIN.reweighed
+
+    def _linearized(self, turn: int) -> Array:
+        """The gradient `[6]`; the information as well."""
+        if turn:
+            self.here = self.beam(self.at.pose, self.blur)
+        pr, pj = prior_rows(self.at, self.at.scene, self.knowns)
+        self.prior = np.zeros((len(pj), _ALL))
+        self.prior[:, :_POSE] = pj
+        information, gradient = self.prior.T @ self.prior, -self.prior.T @ pr
+        for channel in self.channels:
+            more, slope = channel.equations(self.here.value, self.here.rows)
+            information += more
+            gradient += slope
+        self.information = information
+        return gradient
+
+    def _corrected(self) -> Array:
+        """The gradient `[6]` where the fit stands by the slopes where it stood."""
+        light = self.beam.beside(self.here, self.at.pose, self.blur)
+        pr, _ = prior_rows(self.at, self.at.scene, self.knowns)
+        gradient = -self.prior.T @ pr
+        for channel in self.channels:
+            gradient += channel.corrected(light)
+        return gradient
 
     def _step(self, gradient: Array) -> Array | None:
         """The step `[6]`, taken; None if there is none."""

@@ -16,7 +16,7 @@ from conespot.localize.edge.nuisances import Nuisances, first_levels
 from conespot.localize.edge.settings import EDGE
 from conespot.localize.edge.strips import Strips, strip_scores
 from conespot.localize.model.noise import NoiseModel
-from conespot.localize.model.residual import RESIDUAL, follows, incident_light, rest, rms
+from conespot.localize.model.residual import RESIDUAL, follows, incident_light, rest, rms, spread
 from conespot.localize.model.solve import solved
 from conespot.localize.model.view import Shown
 
@@ -43,9 +43,12 @@ class Kept:
 class Channel:
     """A channel's bins about one outline, and the equations of `size` shared parameters."""
 
-    def __init__(self, shown: Shown, strips: Strips, noise: NoiseModel, pixels: int, was: Kept, size: int) -> None:
-        """Each bin has so many `pixels`."""
+    def __init__(
+        self, shown: Shown, strips: Strips, noise: NoiseModel, irradiance: Array, was: Kept, *, pixels: int, size: int
+    ) -> None:
+        """Each bin has so many `pixels`, and the microscope's `irradiance` `[N]`."""
         self._shown, self.strips, self._noise, self._pixels, self._size = shown, strips, noise, pixels, size
+        self._irradiance = irradiance
         self.kept, self._spread, self._white, self._gain = was, was.spread, was.white, was.gain
         self._slow = np.zeros(len(strips.waves))
         self._levels = np.zeros((0, 2))
@@ -54,47 +57,72 @@ class Channel:
         self._precision = np.array(own)
         self._rows = np.empty((size + 1, len(shown.signal)))  # of the shared and the gain
         self._steady: NDArray[np.intp] | None = None
+        #: how much more bins tell of the tip's height by the last weights than by those of the last equations
+        self.heavier = 1.0
 
-    def equations(self, irradiance: Array, light: Array, rows: Array) -> tuple[Array, Array]:
+    def equations(self, light: Array, rows: Array) -> tuple[Array, Array]:
         """Information `[size, size]` and gradient `[size]`, all of the channel's own eliminated.
 
         The spotlights' light is `light` `[N]` with derivatives `rows` `[size, N]`.
         """
-        g, shown, strips = math.exp(self._gain), self._shown, self.strips
-        incident = incident_light(irradiance, g * light)
+        g, size = math.exp(self._gain), self._size
+        incident, model, albedo = self._compared(light, g)
+        self._shot = self._noise.variance(model) / (self._pixels * model * model)
+        if self._steady is None:
+            steep = np.abs(rows[2] / incident)
+            at = len(steep) - 1 - len(steep) // _STEEPEST
+            self._steady = np.flatnonzero(self._shown.usable & (steep > EDGE.steady * np.partition(steep, at)[at]))
+        # as far as the outline still is off residuals scatter more, and those at the edge count nonetheless
+        self._weigh(self._scatter())
+        share = g / incident
+        np.multiply(share, rows, out=self._rows[:size])
+        self._squares = np.square(self._rows[2])
+        self._told, self.heavier = float(self._weights @ self._squares), 1.0
+        np.multiply(share, light, out=self._rows[size])
+        return self._eliminated(self._residual + albedo)
+
+    def corrected(self, light: Array) -> Array:
+        """The gradient `[size]` where a step has led, to `light` `[N]`; slopes are those before it."""
+        self._compared(light, math.exp(self._gain))
+        self._weigh(self._scatter())
+        self.heavier = float(self._weights @ self._squares) / self._told
+        weighted = self._residual * (self._weights / self.heavier)
+        flat, sloped = self.strips.sums(np.stack([weighted, weighted * self.strips.offset]))
+        gradient = np.concatenate([self._rows @ weighted, [flat.sum()], self.strips.waves @ sloped])
+        # the strips' own, as far as their priors let them
+        flat, sloped = np.stack([flat, sloped]) - (self._levels / np.square(self._spread)).T
+        gradient -= self._solved[0][:-1] @ flat + self._solved[1][:-1] @ sloped
+        for part, own, now in zip(self._solved, self._of_strips(flat, sloped), self._levels.T, strict=True):
+            part[-1] = now + own
+        return self._shared(gradient)
+
+    def _compared(self, light: Array, gain: float) -> tuple[Array, Array, Array]:
+        """The light that falls on bins, what they should show, and what strips add to its logarithm, `[N]` each."""
+        shown, index, offset = self._shown, self.strips.index, self.strips.offset
+        incident = incident_light(self._irradiance, gain * light)
         if not len(self._levels):
-            self._level, self._levels = first_levels(shown, strips, incident, self._levels.shape[1])
-        albedo, slow = self._albedo(self._levels[:, 1]), self._slow @ strips.waves
-        albedo += self._levels[strips.index, 0]
-        model = np.exp(self._level + self._albedo(slow) + albedo) * incident
+            self._level, self._levels = first_levels(shown, self.strips, incident, self._levels.shape[1])
+        level, slope = self._levels.T
+        albedo = level[index] + slope[index] * offset
+        model = np.exp(albedo + (self._slow @ self.strips.waves)[index] * offset + self._level) * incident
         residual = shown.signal / model - 1.0
         wide = np.abs(residual) >= RESIDUAL.linear
         if wide.any():
             residual[wide] = np.log(np.maximum(1.0 + residual[wide], RESIDUAL.darkest))
-        variance = self._noise.variance(model) / (self._pixels * model * model)
-        self._scatter(residual, variance, rows[2] / incident)
-        variance += self._white**2
-        square = residual * residual / variance
-        weights = shown.usable * ((RESIDUAL.student + 1.0) / (RESIDUAL.student + square)) / variance
-        share = g / incident
-        self._rows[: self._size] = share * rows
-        self._rows[self._size] = share * light
-        self._whitened, self._residual, self._weights = residual / np.sqrt(variance), residual, weights
-        return self._eliminated(residual + albedo)
+        self._residual = residual
+        return incident, model, albedo
 
-    def _albedo(self, slopes: Array) -> Array:
-        """What slopes of the strips `[S]` do to the log light of each bin `[N]`."""
-        return np.asarray(slopes[self.strips.index] * self.strips.offset)
-
-    def _scatter(self, residual: Array, variance: Array, pull: Array) -> None:
+    def _scatter(self) -> float:
         """What residuals scatter beyond the sensor's noise, from the bins that hold the edge."""
-        if self._steady is None:
-            steep = np.abs(pull)
-            at = len(steep) - 1 - len(steep) // _STEEPEST
-            steady = self._shown.usable & (steep > EDGE.steady * np.partition(steep, at)[at])
-            self._steady = np.flatnonzero(steady)
-        if len(self._steady) > EDGE.fewest_bins:
-            self._white = rest(residual[self._steady], variance[self._steady], self._white)
+        if self._steady is None or len(self._steady) <= EDGE.fewest_bins:
+            return self._white
+        return rest(self._residual[self._steady], self._shot[self._steady], self._white)
+
+    def _weigh(self, white: float) -> None:
+        """Weights of the residuals, which scatter by `white` beyond the sensor's noise."""
+        self._white, variance = white, self._shot + white**2
+        student = RESIDUAL.student
+        self._weights = self._shown.usable * (student + 1.0) / (student * variance + np.square(self._residual))
 
     def _eliminated(self, data: Array) -> tuple[Array, Array]:
         size, strips, many = self._size, self.strips, len(self._rows)
@@ -117,19 +145,29 @@ class Channel:
         normal[:, many + 1 :] = sloped @ waves.T
         normal[many:count, :many] = normal[:many, many:].T
         normal[[*range(many), count], :many] = weighted @ self._rows.T
-        a, b, d = ones + self._spread[0] ** -2, once, twice + self._spread[1] ** -2
-        det = a * d - b * b
-        self._solved = (d * flat - b * sloped) / det, (a * sloped - b * flat) / det
-        self._variance = float(np.mean(d / det)), float(np.mean(a / det))
+        self._system = ones + self._spread[0] ** -2, once, twice + self._spread[1] ** -2
+        self._solved = self._of_strips(flat, sloped)
         normal -= flat @ self._solved[0][:count].T + sloped @ self._solved[1][:count].T
-        self._information, self._gradient = normal[:count], normal[count]
+        self._information = normal[:count]
         own = np.arange(size, count)
         self._information[own, own] += self._precision
-        self._gradient[size + 2 :] -= self._precision[2:] * self._slow
         taken = np.linalg.solve(self._information[size:, size:], self._information[size:])
         self._taken = taken[:, :size]
         information = self._information[:size, :size] - self._information[:size, size:] @ self._taken
-        return information, self._gradient[:size] - self._taken.T @ self._gradient[size:]
+        return information, self._shared(normal[count])
+
+    def _of_strips(self, flat: Array, sloped: Array) -> tuple[Array, Array]:
+        """Levels and slopes of the strips `[..., S]` for weighted sums of columns, and of those times the offset."""
+        a, b, d = self._system
+        det = a * d - b * b
+        return (d * flat - b * sloped) / det, (a * sloped - b * flat) / det
+
+    def _shared(self, gradient: Array) -> Array:
+        """The gradient `[size]` of what is shared, from that of all but the strips' own."""
+        size = self._size
+        gradient[size + 2 :] -= self._precision[2:] * self._slow
+        self._gradient = gradient
+        return np.asarray(gradient[:size] - self._taken.T @ gradient[size:])
 
     def learn(self, step: Array) -> None:
         """Take a step `[size]` of what is shared, and what it means for the channel's own."""
@@ -147,7 +185,9 @@ class Channel:
     def leave(self) -> Kept:
         """What the next frame starts from; the spreads as this frame's levels have them (MacKay 1992)."""
         squares, count = np.square(self._levels).sum(axis=0), len(self._levels)
-        known = np.maximum(count * (1.0 - np.array(self._variance) / self._spread**2), 1.0)
+        a, b, d = self._system
+        variance = np.array([np.mean(d / (a * d - b * b)), np.mean(a / (a * d - b * b))])
+        known = np.maximum(count * (1.0 - variance / self._spread**2), 1.0)
         spread = np.clip(np.sqrt(squares / known), self.kept.smallest, EDGE.widest * self._spread)
         return Kept(self._gain, spread, self.kept.smallest, self.kept.slow_spread, self._white)
 
@@ -155,6 +195,10 @@ class Channel:
     def misfit(self) -> float:
         """Rms of the whitened residuals, gross ones cut."""
         return rms(self._whitened[self._shown.usable])
+
+    @property
+    def _whitened(self) -> Array:
+        return np.asarray(self._residual / np.sqrt(self._shot + self._white**2))
 
     @property
     def contrast(self) -> float:

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from conespot.localize.model.estimate import Estimate
 from conespot.localize.model.forward import rotation_basis
 from conespot.localize.model.sight import Sight
-from conespot.localize.model.smooth import ladder
+from conespot.localize.model.smooth import under_gaussian
 from conespot.localize.model.spread import Spread
 from conespot.scene.pose import Pose
 
@@ -32,6 +32,10 @@ class QuickLight:
     width: float  #: standard deviation of what spreads the image beside the pixels, in the mean [bins]
     cosine: Array  #: of the angle between the bins' rays and the axis `[N]`
     slopes: Array  #: square of its gradient over the image `[N]` [1/bin^2]
+    blurs: Array  #: change of the variance along the cosine per variance of a blur `[N]` [1/mm^2]
+    variance: Array  #: along the cosine, of pixels and all else that spreads the image `[N]`
+    mixed: Array  #: light that the spread adds where it falls off across the edge `[N]` [1/mm^2]
+    blur: float  #: variance beyond that of the scene's lens [mm^2]
 
     def offset(self, half_angle: float) -> Array:
         """Distance of the bins from the outline, positive outside `[N]` [bins], as `outline.distances` has it."""
@@ -80,7 +84,8 @@ class QuickBeam:
             self._second = self._bend(geometry), self._mix(geometry)
         bend, mix = self._second
         w, stretch = profile.variable(cosine + bend)
-        mean, slope, curve = ladder(profile, w, np.sqrt(spread + slopes / 12.0) * stretch, range(3))
+        variance = spread + slopes / 12.0
+        mean, slope, curve = under_gaussian(profile, w, np.sqrt(variance) * stretch, 2)
         lit = facing > 0.0
         f = np.where(lit, facing, 0.0) / d2
         slope *= stretch
@@ -91,7 +96,21 @@ class QuickBeam:
         for row, vector in enumerate(rotation_basis(pose.axis)[:2], start=3):
             rows[row] = slope * (_cross(vector, pose.axis) @ to)
         rows[5] = 0.5 * f * curve * blurs * np.square(stretch)
-        return QuickLight(mean * f + mixed, rows, math.sqrt(float(np.mean(spread / slopes))), cosine, slopes)
+        width = math.sqrt(float(np.mean(spread / slopes)))
+        return QuickLight(mean * f + mixed, rows, width, cosine, slopes, blurs, variance, mixed, blur)
+
+    def beside(self, there: QuickLight, pose: Pose, blur: float) -> Array:
+        """The light of a pose `[N]` beside another one, whose widths are taken for its own."""
+        profile = self._profile
+        to = self._points - pose.apex[:, None]
+        d2 = _dot(to, to)
+        d = np.sqrt(d2)
+        assert self._second is not None
+        w, stretch = profile.variable(pose.axis @ to / d + self._second[0])
+        variance = there.variance if blur == there.blur else there.variance + (blur - there.blur) * there.blurs
+        (mean,) = under_gaussian(profile, w, np.sqrt(variance) * stretch, 0)
+        facing = np.maximum(-_dot(self._normals, to), 0.0)
+        return np.asarray(mean * facing / (d2 * d) + there.mixed)
 
     def _by_tip(self, axis: Array, across: Array, to: Array) -> Array | None:
         """The cosine's gradient over a tip that moves `[3, N]` while the needle goes on through the RCM."""

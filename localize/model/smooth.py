@@ -115,6 +115,31 @@ def ladder(profile: Profile, w: Array, sigma: Array, orders: range) -> Array:
     return found
 
 
+def under_gaussian(profile: Profile, w: Array, sigma: Array, derivatives: int) -> list[Array]:
+    """The profile under Gaussians `[N]` and so many derivatives: the first rungs of a `ladder`, all knots at a time."""
+    t = (w - profile.knots[:, None]) / sigma
+    steps = _rungs(t, profile.jumps.shape[1] - 1)
+    found = []
+    for order in range(derivatives + 1):
+        total: Array | float = 0.0
+        for degree in np.flatnonzero(profile.jumps.any(axis=0)).tolist():
+            size = profile.jumps[:, degree] * math.factorial(degree)
+            total = total + (size @ steps[degree - order]) * sigma ** (degree - order)
+        found.append(np.asarray(total))
+    return found
+
+
+def _rungs(t: Array, highest: int) -> dict[int, Array]:
+    """N_n(t) for n from -2 to `highest`, of any shape."""
+    from scipy.special import ndtr  # as in `_steps`
+
+    phi, whole = np.exp(-0.5 * np.square(t)) / math.sqrt(2.0 * math.pi), ndtr(t)
+    steps = {-2: -t * phi, -1: phi, 0: whole}
+    for n in range(1, highest + 1):
+        steps[n] = (t * steps[n - 1] + steps[n - 2]) / n
+    return steps
+
+
 def _steps(t: Array, highest: int, lowest: int) -> dict[int, Array]:
     """N_n(t) for n from -`lowest` to `highest`."""
     from scipy.special import ndtr  # every process of a campaign would wait for it
