@@ -90,9 +90,12 @@ def tangents(axis: Array) -> tuple[Array, Array]:
 @functools.lru_cache(maxsize=64)
 def _tangents(axis: bytes) -> tuple[Array, Array]:
     """A fit asks for those of one axis a dozen times; nobody may write into them."""
-    frame = Pose(np.zeros(3), np.frombuffer(axis)).rotation()
+    pose = Pose(np.zeros(3), np.frombuffer(axis))
+    azimuth, tilt = pose.azimuth, pose.tilt
+    c, s, down = math.cos(azimuth), math.sin(azimuth), math.cos(tilt)
+    frame = np.array([[c * down, s * down, -math.sin(tilt)], [-s, c, 0.0]]) + 0.0  # no zero is negative
     frame.flags.writeable = False
-    return frame[:, 0], frame[:, 1]
+    return frame[0], frame[1]
 
 
 def cone_rays(axis: Array, half_angle: ArrayLike, azimuth: ArrayLike) -> Array:

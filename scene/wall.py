@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -38,7 +39,7 @@ class Wall:
         ahead = scene.surface.intersect(scene.eye, apex, axis)
         return cls(scene, apex, axis, ahead, _nearest(scene, apex))
 
-    @property
+    @cached_property
     def distances(self) -> Array:
         """Along the axis and from the nearest point `[2]` [mm]; negative for a tip behind the wall."""
         inside = float(self.scene.depth(self.apex)) >= 0.0
@@ -49,7 +50,7 @@ class Wall:
         """Change of both per change of tip [mm] and axis [rad] `[2, size]`: tip, axis along its tangents, roll."""
         along, nearest = self.distances
         rows = np.zeros((2, size))
-        n = self._normal(self.ahead)
+        n = self._ahead_normal
         facing = float(n @ self.axis)
         rows[0, :3] = -n / facing
         rows[0, 3:5] = [-along * float(n @ tangent) / facing for tangent in tangents(self.axis)]
@@ -58,7 +59,7 @@ class Wall:
 
     def by_wall(self, other: Scene) -> Array:
         """Change of both `[2]` [mm] where the wall becomes another scene's, to first order."""
-        n = self._normal(self.ahead)
+        n = self._ahead_normal
         along = float(n @ self._moved(self.ahead, other)) / float(n @ self.axis)
         _, nearest = self.distances
         inwards = (self.apex - self.nearest) / (nearest or 1.0)
@@ -67,11 +68,15 @@ class Wall:
 
     def by_relief(self) -> Array:
         """Change of both `[2]` per mm that the wall is raised."""
-        return np.array([1.0 / abs(float(self._normal(self.ahead) @ self.axis)), 1.0])
+        return np.array([1.0 / abs(float(self._ahead_normal @ self.axis)), 1.0])
 
     def _direction(self, point: Array) -> Array:
         away = point - self.scene.eye.centre
         return np.asarray(away / np.linalg.norm(away))
+
+    @cached_property
+    def _ahead_normal(self) -> Array:
+        return self._normal(self.ahead)
 
     def _normal(self, point: Array) -> Array:
         return self.scene.surface.normals(self.scene.eye, self._direction(point))

@@ -16,7 +16,7 @@ from conespot.localize.edge.nuisances import Nuisances, first_levels
 from conespot.localize.edge.settings import EDGE
 from conespot.localize.edge.strips import Strips, strip_scores
 from conespot.localize.model.noise import NoiseModel
-from conespot.localize.model.residual import RESIDUAL, follows, incident_light, rest, rms, spread
+from conespot.localize.model.residual import RESIDUAL, follows, incident_light, median, rest, rms
 from conespot.localize.model.solve import solved
 from conespot.localize.model.view import Shown
 
@@ -208,7 +208,7 @@ class Channel:
         if not inside.any() or not outside.any():
             return 0.0
         signal = self._shown.signal
-        return float(np.median(signal[inside])) / max(float(np.median(signal[outside])), 1e-9)
+        return median(signal[inside]) / max(median(signal[outside]), 1e-9)
 
     def scores(self, size: int) -> tuple[Array, Array, Array]:
         """The strips' gradients `[S, size]` and informations `[S, size, size]` of the first `size` shared parameters.

@@ -43,7 +43,8 @@ class QuickLight:
         # the cosine's gradient is the angle's times the sine, and on the axis itself both are nought
         steepest = float(self.slopes.max())
         over = sine / np.sqrt(np.maximum(self.slopes, 1e-9 * steepest))
-        return np.asarray((np.arctan2(sine, self.cosine) - half_angle) * over)
+        # within a band the angle is off the half angle by less than a right angle
+        return np.asarray(np.arcsin(sine * math.cos(half_angle) - self.cosine * math.sin(half_angle)) * over)
 
 
 class QuickBeam:

@@ -52,8 +52,8 @@ class Rim:
         middle = points.mean(axis=0) - low
         perimeter = float(np.sum(np.hypot(*np.diff(points, axis=0, append=points[:1]).T)))
         count = max(8, int(perimeter / WIDTH))
-        turn = (np.arctan2(row - middle[1], column - middle[0]) + math.pi) * (count / (2.0 * math.pi))
-        strip = np.minimum(turn.astype(np.intp), count - 1)
+        turn = cv2.phase((column - middle[0]).astype(np.float32), (row - middle[1]).astype(np.float32))
+        strip = np.minimum((turn * (count / (2.0 * math.pi))).astype(np.intp), count - 1)
         order = np.argsort(strip.astype(np.uint16), kind="stable")  # of so few bits it is a radix sort
         row, column, strip = row[order], column[order], strip[order]
         new = np.append(True, strip[1:] != strip[:-1])

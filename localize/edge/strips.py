@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -63,11 +63,7 @@ class Strips:
         """Harmonics 0 to 2 around each outline at every strip `[5 T, S]`."""
         waves = np.zeros((5 * len(self.turns), self.count))
         for number, turn in enumerate(self.turns):
-            angle = np.arange(turn.stop - turn.start) * (2.0 * np.pi / (turn.stop - turn.start))
-            waves[5 * number, turn] = 1.0
-            for m in (1, 2):
-                waves[5 * number + 2 * m - 1, turn] = np.cos(m * angle)
-                waves[5 * number + 2 * m, turn] = np.sin(m * angle)
+            waves[5 * number : 5 * number + 5, turn] = _harmonics(turn.stop - turn.start)
         return waves
 
     def slow_gradient(self, levels: Array) -> float:
@@ -84,6 +80,13 @@ class Strips:
         """What the strips' own `[S, 2 or 3]`, level, slope and odds, do to the log light of each bin `[N]`."""
         found = levels[self.index, 0] + levels[self.index, 1] * self.offset
         return np.asarray(found if self.odds is None else found + levels[self.index, 2] * self.odds)
+
+
+@lru_cache(maxsize=64)
+def _harmonics(count: int) -> Array:
+    """Harmonics 0 to 2 at so many strips around an outline `[5, count]`."""
+    angle = np.arange(count) * (2.0 * np.pi / count)
+    return np.stack([np.ones(count), *(wave(m * angle) for m in (1, 2) for wave in (np.cos, np.sin))])
 
 
 @dataclass(frozen=True)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
+from functools import lru_cache
 from typing import Literal
 
 from conespot.localize.model.deep import Deep
@@ -73,7 +74,7 @@ class Knowns:
     @property
     def free(self) -> tuple[Quantity, ...]:
         """The scene's quantities that join the fit, in the order of its parameters."""
-        return tuple(each for each in QUANTITIES if self.sigma(each) != 0.0)
+        return _free(self)
 
     @property
     def doubting(self) -> Knowns:
@@ -92,3 +93,9 @@ class Knowns:
         if own is None:
             return None
         return 0.0 if isinstance(own, str) else (own * quantity.per_unit) ** quantity.power
+
+
+@lru_cache(maxsize=64)
+def _free(knowns: Knowns) -> tuple[Quantity, ...]:
+    """A fit asks for those of the same knowns at each step."""
+    return tuple(each for each in QUANTITIES if knowns.sigma(each) != 0.0)

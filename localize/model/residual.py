@@ -113,15 +113,25 @@ def rms(whitened: Array) -> float:
     return float(np.sqrt(np.mean(np.minimum(np.square(whitened), RESIDUAL.gross**2)))) if len(whitened) else math.inf
 
 
+def median(values: Array) -> float:
+    """The median of values of any shape, as numpy has it in a tenth of its time; not a number where one is none."""
+    half, odd = divmod(values.size, 2)
+    least = half if odd else half - 1
+    part = np.partition(values, (least, half, values.size - 1), axis=None)
+    if math.isnan(part[-1]):
+        return math.nan
+    return float(part[half]) if odd else float(part[least] + part[half]) / 2.0
+
+
 def spread(residuals: Array) -> float:
     """Robust standard deviation: 1.4826 times the median absolute value."""
-    return 1.4826 * float(np.median(np.abs(residuals))) if len(residuals) else 0.0
+    return 1.4826 * median(np.abs(residuals)) if len(residuals) else 0.0
 
 
 def rest(residuals: Array, variances: Array, before: float) -> float:
     """What residuals scatter beyond the sensor's `variances`, one step from `before`: albedo nothing else explains."""
     whole = variances + before**2
     ratio = spread(residuals / np.sqrt(whole)) ** 2
-    found = before**2 + (ratio - 1.0) * float(np.median(whole))
+    found = before**2 + (ratio - 1.0) * median(whole)
     least, most = RESIDUAL.rest
     return float(np.sqrt(np.clip(found, least**2, most**2)))
