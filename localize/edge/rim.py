@@ -13,6 +13,7 @@ from conespot.localize.edge.settings import EDGE
 from conespot.localize.edge.strips import WIDTH
 from conespot.localize.model.view import Window
 from conespot.scene.scene import Scene
+from conespot.scene.vignetting import seen_whole
 
 Array = NDArray[np.float64]
 _SHARE = 4  #: bits of a bin to which an outline is drawn
@@ -32,7 +33,7 @@ class Rim:
     def about(cls, curve: Array, scene: Scene, side: int, inner: float, outer: float) -> Rim | None:
         """The bins of `side` px up to `inner` bins inside an outline `[K, 2]` [px] and `outer` outside.
 
-        None where they are not all in the frame.
+        None where they are not all in the frame, or the iris cuts into the light of the outline.
         """
         edge = np.array(scene.camera.shape[::-1]) // side
         points = curve / side - 0.5
@@ -40,6 +41,8 @@ class Rim:
         low = np.floor(points.min(axis=0)).astype(int) - out
         high = np.ceil(points.max(axis=0)).astype(int) + out + 1
         if np.any(low < 0) or np.any(high > edge) or np.any(high - low < 4):
+            return None
+        if not seen_whole(scene.camera, curve).all():
             return None
         mask = np.zeros((high[1] - low[1], high[0] - low[0]), np.uint8)
         cv2.fillPoly(mask, [np.round(2**_SHARE * (points - low)).astype(np.int32)], 1, shift=_SHARE)

@@ -8,6 +8,7 @@ from hypothesis import strategies as st
 from conespot.localize import Knowns, SensorNoise
 from conespot.localize.edge.fit import fit_edge
 from conespot.localize.edge.ribbon import Ribbon
+from conespot.localize.edge.rim import Rim
 from conespot.localize.edge.saturated import SaturatedFit
 from conespot.localize.edge.strips import Strips, score_covariance
 from conespot.localize.image import Frame
@@ -15,6 +16,7 @@ from conespot.localize.model.estimate import Estimate
 from conespot.localize.model.forward import ambient_irradiance, light, moved
 from conespot.localize.model.profile import Profile
 from conespot.localize.model.sight import look, window
+from conespot.localize.model.view import outline
 from conespot.localize.theory.bounds import cramer_rao
 from conespot.scene import Pose, Scene, load_scene
 from conespot.scene.beam import CyclesBeam, HardBeam, LinearBeam
@@ -210,3 +212,7 @@ def test_bins_whose_light_the_iris_cuts_take_no_part():
     )
     assert band.covered == pytest.approx(whole, abs=0.02)
     assert whole < shown - 0.1
+    # a fit that follows has no such bins to leave out
+    followed = [Rim.about(outline(at, k, 64), scene, 1, 4.0, 4.0) is not None for k in range(3)]
+    assert followed == [seen_whole(scene.camera, outline(at, k, 64)).all() for k in range(3)]
+    assert set(followed) == {True, False}
