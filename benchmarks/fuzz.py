@@ -94,11 +94,11 @@ def frames(folder: Path, count: int, moment: random.Random) -> Made:
 
 
 def strangers_frames(folder: Path, count: int, moment: random.Random) -> Made:
-    """Images and videos from outside: broken, cut off, mislabelled, huge, or of another scene."""
+    """Images and videos from outside: broken, cut off, mislabelled, huge, of another scene, or none at all."""
     for _ in range(count):
         path, name = strangers_file(folder, moment)
         written = folder / "x.csv"
-        command = ["localize", path.name, "--scene", "paper", *settings_of(name), "--csv", written.name]
+        command = ["localize", str(path), "--scene", "paper", *settings_of(name), "--csv", written.name]
         yield path, lambda path=path, name=name: list(read_frames([path], scene_of(name))), command
         written.unlink(missing_ok=True)
         assert not list(folder.glob(".*.tmp")), "something was left half-written"

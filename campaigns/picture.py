@@ -27,7 +27,7 @@ def draw_answer(answer: Answer, scene: Scene, localizer: str, path: Path) -> Non
     marks = [Mark("edge seen", edge, "about Z", "dots") for edge in saw.edges if len(edge)]
     said, distance = "refused", ""
     if isinstance(found, Localization):
-        marks += _needle(Needle.of(found, scene), scene.camera.shape[1])
+        marks += _needle(Needle.of(found, found.seen_in(scene)), scene.camera.shape[1])
         said = f"tip {' '.join(f'{value:.4f}' for value in found.apex_mm)} mm"
         distance = _distance(found)
     else:

@@ -73,7 +73,7 @@ def account(image: AnyImage, scene: Scene, localizer: str, outcome: Outcome) -> 
     """What a localizer of that name saw in a checked image on the way to its `outcome`."""
     frame, estimate = Frame(image, scene.sensor), None
     if not isinstance(outcome, LocalizationFailure):
-        estimate = Estimate(Pose(outcome.apex_mm, outcome.axis, outcome.roll or 0.0), scene)
+        estimate = Estimate(Pose(outcome.apex_mm, outcome.axis, outcome.roll or 0.0), outcome.seen_in(scene))
     method = METHODS.get(localizer)
     if method is None:
         cones = () if estimate is None else tuple(outline(estimate, k, _POINTS) for k in range(len(scene.spotlights)))

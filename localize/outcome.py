@@ -8,6 +8,9 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
+from conespot.scene.camera import Camera
+from conespot.scene.scene import Scene
+
 Array = NDArray[np.float64]
 
 #: reasons of more than one stage; a reason is counted by its text, so it carries no numbers
@@ -61,7 +64,8 @@ class Localization:
     localizer knows it, is `[5, 5]` over the apex [mm] and the axis's components [rad] along the first two columns
     of `Pose.rotation()`, or `[6, 6]` with the roll [rad] behind them. `spread_mm` is the root mean square distance
     of several spotlights' positions from their mean, None where there was one estimate. `roll` [rad] is as in `Pose`,
-    None for localizers that do not measure it. `distance` is the tip's from the wall, which `locate` adds.
+    None for localizers that do not measure it. `distance` is the tip's from the wall, which `locate` adds. `camera` is
+    the one that the answer belongs to, where the fit found it to stand otherwise than told.
     """
 
     apex_mm: Array
@@ -70,6 +74,11 @@ class Localization:
     spread_mm: float | None = None
     roll: float | None = None
     distance: Distance | None = None
+    camera: Camera | None = None
+
+    def seen_in(self, scene: Scene) -> Scene:
+        """The scene in which its outlines lie where the frame has them."""
+        return scene if self.camera is None else scene.model_copy(update={"camera": self.camera})
 
 
 @dataclass(frozen=True)

@@ -16,6 +16,7 @@ from conespot.localize.model.prior import rcm_miss
 from conespot.localize.model.smear import sag_sigma
 from conespot.localize.model.suspicion import WALL
 from conespot.localize.outcome import COVERED, OUTSIDE, UNCERTAIN, Localization, LocalizationFailure, Outcome
+from conespot.scene.camera import Camera
 from conespot.scene.scene import Scene
 
 Array = NDArray[np.float64]
@@ -120,12 +121,21 @@ def judged(
     if not settled:
         return LocalizationFailure(UNSETTLED)
     distance = distance_of(estimate, joint, knowns, joint=True)
+    camera = _moved(estimate.scene.camera, nominal.camera)
     if size == 6:
         # a pose's roll turns about the needle's back end, the fit's about the axis into the light
         pose[5, :5] *= -1.0
         pose[:5, 5] *= -1.0
-        return Localization(estimate.pose.apex, estimate.pose.axis, pose, roll=estimate.pose.roll, distance=distance)
-    return Localization(estimate.pose.apex, estimate.pose.axis, pose, distance=distance)
+        return Localization(
+            estimate.pose.apex, estimate.pose.axis, pose, roll=estimate.pose.roll, distance=distance, camera=camera
+        )
+    return Localization(estimate.pose.apex, estimate.pose.axis, pose, distance=distance, camera=camera)
+
+
+def _moved(found: Camera, nominal: Camera) -> Camera | None:
+    """The camera as it was found, where it stands otherwise than told."""
+    stands = (found.height, found.tilt, found.azimuth)
+    return None if stands == (nominal.height, nominal.tilt, nominal.azimuth) else found
 
 
 def _too_wide(found: Scene, nominal: Scene, knowns: Knowns) -> bool:

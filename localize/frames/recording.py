@@ -2,18 +2,24 @@
 
 from __future__ import annotations
 
+import struct
 from collections.abc import Iterator
 from pathlib import Path
+from typing import BinaryIO
 
-from conespot.localize.frames.still import still_of
+from conespot.localize.frames.still import most_bytes, still_of
 from conespot.localize.frames.stored import Stored
 from conespot.scene.document import InputError
 from conespot.scene.scene import Scene
 
 SUFFIX = ".mcap"
 _KIND = "sensor_msgs/msg/CompressedImage"
-#: bytes of an unpacked chunk; frames of a camera of this size are in chunks of a few megabytes
-_MOST_CHUNK = 400_000_000
+#: bytes of a record, packed
+_MOST_RECORD = 400_000_000
+#: what MCAP's specification calls a chunk, and where its head says how many bytes it unpacks to
+_CHUNK, _HEAD = 6, struct.Struct("<QQQII")
+#: bytes before the first record
+_BEGINNING = 8
 
 
 def read_recording(path: Path, scene: Scene) -> Iterator[tuple[float, Stored]]:
@@ -30,8 +36,9 @@ def read_recording(path: Path, scene: Scene) -> Iterator[tuple[float, Stored]]:
     topic: str | None = None
     try:
         with open(path, "rb") as stream:
+            _check_chunks(stream, most_bytes(1, scene))
             reader = SeekingReader(
-                stream, validate_crcs=True, record_size_limit=_MOST_CHUNK, decoder_factories=[DecoderFactory()]
+                stream, validate_crcs=True, record_size_limit=_MOST_RECORD, decoder_factories=[DecoderFactory()]
             )
             for schema, channel, _, message in reader.iter_decoded_messages(log_time_order=True):
                 if schema is None or schema.name != _KIND:
@@ -50,3 +57,28 @@ def read_recording(path: Path, scene: Scene) -> Iterator[tuple[float, Stored]]:
         raise InputError(f"{path}: cannot be read as MCAP: {' '.join(str(error).split())[:200]}") from None
     if topic is None:
         raise InputError(f"{path}: holds no compressed image ({_KIND})")
+
+
+def _check_chunks(stream: BinaryIO, most: int) -> None:
+    """Raise ValueError for a chunk that says, or whose packing says, that it unpacks to more than `most` bytes.
+
+    Who unpacks it believes the packing. A chunk is about a megabyte, or one message where that is larger.
+    """
+    import lz4.frame
+    import zstandard
+
+    stream.seek(_BEGINNING)
+    while len(head := stream.read(9)) == 9:
+        kind, length = struct.unpack("<BQ", head)
+        after = stream.tell() + length
+        if kind == _CHUNK and len(first := stream.read(_HEAD.size)) == _HEAD.size:
+            _, _, size, _, words = _HEAD.unpack(first)
+            packing, packed = stream.read(min(words, 16)), stream.read(8) and stream.read(max(0, after - stream.tell()))
+            if packing == b"zstd" and (said := zstandard.frame_content_size(packed)) >= 0:
+                size = max(size, said)
+            elif packing == b"lz4":
+                size = max(size, len(lz4.frame.LZ4FrameDecompressor().decompress(packed, max_length=most + 1)))
+            if size > most:
+                raise ValueError(f"a chunk unpacks to {size} bytes, more than a frame of this camera can have")
+        stream.seek(after)
+    stream.seek(0)

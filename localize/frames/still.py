@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import io
 import warnings
+import zlib
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -37,6 +38,10 @@ _MOST_BYTES, _BESIDE_BYTES = 32, 8_000_000
 #: bytes of a TIFF of several pages: it is held in memory, twice for a moment
 _MOST_STACK_BYTES = 400_000_000
 _ORIENTATION = 274
+#: bytes of a PNG's data that are unpacked within a second or two whatever they hold
+_FEW_PACKED = 200_000
+#: what begins a scan of a JPEG, and how many there may be: an encoder makes ten, a thumbnail one more
+_SCAN, _MOST_SCANS = b"\xff\xda", 64
 #: where a PNG's first chunk says how many bits a value has, and of which colours it is
 _PNG_BITS, _PNG_COLOUR = 24, 25
 _TIFF_KINDS = {0: "white is zero", 3: "a palette", 4: "a mask", 5: "CMYK", 6: "YCbCr", 8: "CIELAB"}
@@ -79,12 +84,12 @@ def _raw(path: Path, least: int, scene: Scene) -> bytes:
     """A file's bytes, of which a frame has a limit that is at `least` so many."""
     rows, columns = scene.camera.shape
     try:
-        return read_bytes(path, max(least, _most(1, scene)), f"frame of {columns} x {rows} px")
+        return read_bytes(path, max(least, most_bytes(1, scene)), f"frame of {columns} x {rows} px")
     except ValueError as error:
         raise InputError(str(error)) from None
 
 
-def _most(frames: int, scene: Scene) -> int:
+def most_bytes(frames: int, scene: Scene) -> int:
     """Bytes of a file of so many frames."""
     rows, columns = scene.camera.shape
     return frames * rows * columns * _MOST_BYTES + _BESIDE_BYTES
@@ -94,7 +99,7 @@ def still_of(name: str, raw: bytes, scene: Scene) -> Stored:
     """The picture in the bytes of a PNG, JPEG or TIFF called `name`. Raises InputError as `read_stills` does."""
     kind = next((kind for magic, kind in MAGIC.items() if raw.startswith(magic)), None)
     rows, columns = scene.camera.shape
-    if kind not in ("PNG", "JPEG", "TIFF") or len(raw) > _most(1, scene):
+    if kind not in ("PNG", "JPEG", "TIFF") or len(raw) > most_bytes(1, scene):
         raise InputError(f"{name}: is no PNG, JPEG or TIFF of a frame of {columns} x {rows} px")
     return _picture(name, kind, raw, scene)
 
@@ -134,7 +139,34 @@ def _png(name: str, raw: bytes, scene: Scene) -> Stored:
         Image.open(io.BytesIO(raw), formats=["PNG"]).verify()  # every chunk's checksum: libpng would complain on stderr
     except Exception as error:
         raise _broken(name, "PNG", error) from None
+    if _unpacks_beyond(raw, size):
+        raise InputError(f"{name}: cannot be read as PNG: its data go on behind the last row")
     return Stored(_unpacked(name, "PNG", raw), turn, transfer)
+
+
+def _unpacks_beyond(raw: bytes, size: tuple[int, int]) -> bool:
+    """Whether a PNG, its chunks being whole, unpacks to more than a picture of `size` (columns, rows) has.
+
+    libpng unpacks all of it before it returns: a megabyte may hold a thousand.
+    """
+    parts, at = [], 8
+    while at < len(raw):
+        end = at + 8 + int.from_bytes(raw[at : at + 4], "big")
+        if raw[at + 4 : at + 8] == b"IDAT":
+            parts.append(memoryview(raw)[at + 8 : end])
+        at = end + 4
+    if sum(map(len, parts)) < _FEW_PACKED:
+        return False
+    most = size[0] * size[1] * 8 + 16 * size[1] + 1000  # four values of 16 bits, and each row's filter, interlaced too
+    packed, found = zlib.decompressobj(), 0
+    try:
+        for part in parts:
+            found += len(packed.decompress(part, most + 1 - found))
+            if found > most:
+                return True
+    except zlib.error:  # libpng says what
+        return False
+    return False
 
 
 def _jpeg(name: str, raw: bytes, scene: Scene) -> Stored:
@@ -148,6 +180,8 @@ def _jpeg(name: str, raw: bytes, scene: Scene) -> Stored:
     if mode not in ("L", "RGB"):
         raise InputError(f"{name}: is a JPEG in {mode}; save it in grey or RGB")
     check_size(name, picture.height, picture.width, (turn, Turn.stated(scene.storage)), scene)
+    if (scans := raw.count(_SCAN)) > _MOST_SCANS:
+        raise InputError(f"{name}: is a JPEG of {scans} scans, each of which is a picture to unpack; save it anew")
     try:
         pixels = np.asarray(picture)
     except Exception as error:
@@ -158,7 +192,7 @@ def _jpeg(name: str, raw: bytes, scene: Scene) -> Stored:
 def _stack(name: str, raw: bytearray, scene: Scene) -> Iterator[tuple[str, Stored]]:
     """The pages of a TIFF, one unpacked at a time."""
     pages = _pages(name, raw, scene)
-    if len(raw) > _most(len(pages), scene):
+    if len(raw) > most_bytes(len(pages), scene):
         said = "a frame" if len(pages) == 1 else f"{len(pages)} frames"
         raise InputError(f"{name}: larger than {said} of {scene.camera.size_words} can be")
     for number, page in enumerate(pages):

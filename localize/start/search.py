@@ -49,11 +49,14 @@ class Start:
         """Whether it may be a spotlight's light at all."""
         return self.clearest > START.clear and self.explained > START.least_share and self.evidence > START.faintest
 
-    def near(self, pose: Pose, scene: Scene, share: float) -> bool:
-        """Whether the outlines of `pose` are within a `share` of their radius, or a grain, of where the start is."""
+    def near(self, pose: Pose, scene: Scene, share: float, seen: Scene | None = None) -> bool:
+        """Whether the outlines of `pose` are within a `share` of their radius, or a grain, of where the start is.
+
+        The pose may be of a scene of its own, `seen` through another camera.
+        """
         return all(
             float(np.linalg.norm(mine[0] - other[0])) + abs(mine[1] - other[1]) < max(share * mine[1], self.grain)
-            for mine, other in zip(_circles(self.pose, scene), _circles(pose, scene), strict=True)
+            for mine, other in zip(_circles(self.pose, scene), _circles(pose, seen or scene), strict=True)
         )
 
     def touches(self, other: Start, scene: Scene) -> bool:
@@ -150,7 +153,7 @@ def believed(starts: Iterable[Start], scene: Scene, localized: Callable[[Start],
         outcome = localized(start)
         if isinstance(outcome, Localization):
             pose = Pose(outcome.apex_mm, outcome.axis, outcome.roll or 0.0)
-            if start.near(pose, scene, START.near):
+            if start.near(pose, scene, START.near, outcome.seen_in(scene)):
                 if found is None:
                     found = start, outcome
                 elif _contradict(found, (start, outcome), scene):

@@ -12,6 +12,7 @@ import cv2
 import numpy as np
 from film import write_film
 from mutants import mutated_bytes
+from odd_files import chunk, odd_files
 from PIL import Image
 
 from conespot.scene import Scene
@@ -75,7 +76,7 @@ def huge_files() -> dict[str, bytes]:
     side = 12_000
     rows = zlib.compress(bytes(side + 1) * 2000, 9)  # honest about its first 2,000 rows
     head = struct.pack(">IIBBBBB", side, side, 8, 0, 0, 0, 0)
-    png = b"\x89PNG\r\n\x1a\n" + b"".join(_chunk(*part) for part in ((b"IHDR", head), (b"IDAT", rows), (b"IEND", b"")))
+    png = b"\x89PNG\r\n\x1a\n" + b"".join(chunk(*part) for part in ((b"IHDR", head), (b"IDAT", rows), (b"IEND", b"")))
     tags = {256: side, 257: side, 258: 16, 259: 1, 262: 1, 273: 8, 277: 1, 278: side, 279: 2 * side * side}
     entries = b"".join(struct.pack("<HHII", tag, 4, 1, value) for tag, value in tags.items())
     tiff = struct.pack("<2sHIH", b"II", 42, 8, len(tags)) + entries + bytes(4)
@@ -84,8 +85,11 @@ def huge_files() -> dict[str, bytes]:
     return {"huge.png": png, "huge.tiff": tiff, "huge.jpg": jpeg}
 
 
-def _chunk(kind: bytes, data: bytes) -> bytes:
-    return struct.pack(">I", len(data)) + kind + data + struct.pack(">I", zlib.crc32(kind + data))
+@functools.cache
+def _odd(folder: Path) -> list[Path]:
+    place = folder / "odd"
+    place.mkdir()
+    return odd_files(place, SIDE)
 
 
 def strangers_file(folder: Path, moment: random.Random) -> tuple[Path, str]:
@@ -93,6 +97,8 @@ def strangers_file(folder: Path, moment: random.Random) -> tuple[Path, str]:
     whole = whole_files(folder)
     name = moment.choice(list(whole))
     data, ending = whole[name], name.rpartition(".")[2]
+    if moment.random() < 0.15:
+        return moment.choice(_odd(folder)), name
     match moment.randrange(8):
         case 0:
             data = data[: moment.randrange(len(data))]

@@ -9,6 +9,7 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from mutants import mutated_bytes, mutated_text
+from odd_files import odd_files
 from strangers_frames import huge_files, scene_of, strangers_file
 
 from conespot.campaigns.plan import make_plan
@@ -49,6 +50,21 @@ def test_a_mutated_csv_file_is_read_or_refused(tmp_path, moment, key):
     scene = "scene: paper\n" if key.startswith("trajectory") else "scene:\n  preset: paper\n  "
     (tmp_path / "c.yaml").write_text(f"{scene}{key}\n{'' if 'trajectory' in key else '#'}\nposes: 1\n")
     valid_or_refused(lambda: make_plan(read_campaign(str(tmp_path / "c.yaml"))))
+
+
+def test_what_stands_in_a_frames_place_is_read_or_refused_before_it_is_unpacked(tmp_path):
+    """Pipes, devices, loops, other formats, and pictures whose few megabytes unpack to gigabytes or for minutes."""
+    said = {}
+    for path in odd_files(tmp_path, (60, 40)):
+        try:
+            list(read_frames([path], scene_of("eight.png")))
+        except InputError as error:
+            said[path.name] = str(error)
+    assert all(words.isprintable() for words in said.values())
+    assert "go on behind the last row" in said["bomb_data.png"]
+    assert "scans, each of which is a picture" in said["scans.jpg"]
+    assert "a chunk unpacks to 200000000 bytes" in said["bomb.mcap"]
+    assert "a chunk unpacks to 200000000 bytes" in said["lie.mcap"]
 
 
 @pytest.fixture(scope="module")
