@@ -75,6 +75,7 @@ class Stage:
     outer: float
     iterations: int  #: at most
     enough: float  #: a step that is shorter ends them [sigmas of uncorrelated residuals]
+    sharp: bool  #: whether the edge is a step
 
 
 @dataclass(frozen=True)
@@ -181,6 +182,7 @@ def fit_band(
     band = Ribbon.along(frame, estimate, side=side, inner=stage.inner, outer=stage.outer)
     if band is None:
         return LocalizationFailure(COVERED)
+    band = replace(band, strips=replace(band.strips, sloping=not stage.sharp))
     if reference is not None:
         band = band.told(reference, nominal, noise)
     sight = look(nominal, band.pixels, side)

@@ -36,8 +36,9 @@ class Kept:
 
     @classmethod
     def of(cls, fitted: Nuisances) -> Kept:
-        """What a band's fit leaves."""
-        return cls(fitted.gain, fitted.spread, fitted.smallest, fitted.slow_spread, fitted.white)
+        """What a band's fit leaves; here the strips' own levels are all of them, the slow ones too."""
+        spread = np.append(np.hypot(fitted.spread[0], fitted.slow_scatter), fitted.spread[1:])
+        return cls(fitted.gain, spread, fitted.smallest, fitted.slow_spread, fitted.white)
 
 
 class Channel:

@@ -120,7 +120,7 @@ def _bands(
         while True:
             found = fit_band(
                 frame, start, fit, used, noise, reference,
-                stage=_stage(level, patch.size, edge_width(start), last=last),
+                stage=_stage(level, patch, edge_width(start), last=last),
                 tied=number == 0 and len(patch.levels) > 1, doubted=doubting if used != doubting else None,
             )  # fmt: skip
             if isinstance(found, LocalizationFailure):
@@ -144,14 +144,14 @@ def _levels(levels: tuple[Level, ...], size: float) -> list[Level]:
     return [level for level in levels if every or level.bins is None or int(size / level.bins) > 1]
 
 
-def _stage(level: Level, size: float, width: float, *, last: bool) -> Stage:
-    """The bins of a level on a patch of `size` [px], and the band of an edge that is `width` [px] wide."""
-    side = 1 if level.bins is None else max(1, int(size / level.bins))
+def _stage(level: Level, patch: _Patch, width: float, *, last: bool) -> Stage:
+    """The bins of a level on a patch, and the band of an edge that is `width` [px] wide."""
+    side = 1 if level.bins is None else max(1, int(patch.size / level.bins))
     if last:
         # bins half as wide as the blur see all of it
         side = max(side, int(EDGE.bins_a_width * width))
     reach = EDGE.widths * width / side
-    return Stage(side, level.inner + reach, level.outer + reach, level.iterations, EDGE.enough[last])
+    return Stage(side, level.inner + reach, level.outer + reach, level.iterations, EDGE.enough[last], patch.sharp)
 
 
 def _throughout(frame: Frame, start: Estimate, knowns: Knowns, size: float) -> SaturatedFit | LocalizationFailure:

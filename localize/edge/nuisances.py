@@ -93,7 +93,7 @@ class Nuisances:
     def precision(self) -> Array:
         """Prior precision of gain, level and slow slopes."""
         gain = 1e-9 if self.told is None else self.told[1] ** -2
-        spreads = [self.slow_spread] if self.strips.odds is None else [self.slow_spread, *2 * [self.slow_level]]
+        spreads = [self.slow_spread, *self.strips.slow_levels * [self.slow_level]]
         return np.concatenate([[gain, 1e-9], np.repeat(np.array(spreads) ** -2, len(self.slow) // len(spreads))])
 
     def eliminated(self, size: int, profile: float | None = None) -> Eliminated:
@@ -122,6 +122,17 @@ class Nuisances:
         """The strips' own gradients `[S, P]` and informations `[S, P, P]`."""
         return strip_scores(self.strips, self.jacobian, self.residual, self.weights, self.levels, self.spread)
 
+    @property
+    def slow_scatter(self) -> float:
+        """Rms of the levels that vary slowly; 0 where none do."""
+        return float(np.sqrt(np.mean(np.square(self._slow_levels @ self.strips.waves)))) if self.strips.sloping else 0.0
+
+    @property
+    def _slow_levels(self) -> Array:
+        """The levels that vary slowly `[5 T]`."""
+        count = len(self.strips.waves)
+        return self.slow[count : 2 * count]
+
     def learn(self, part: Eliminated, step: Array) -> None:
         """Take a step `[P]`: gain, level, the strips' levels and, from those, how much they scatter (MacKay 1992)."""
         own = step[-2 - len(self.slow) :]
@@ -134,17 +145,17 @@ class Nuisances:
         self.spread = np.clip(found, self.smallest, EDGE.widest * self.spread)
         # albedo has no direction: across the outline it changes as much as along
         levels = self.levels[:, 0]
-        if self.strips.odds is not None:
+        if self.strips.slow_levels:
             levels = levels + self._learn_slow_levels(part) @ self.strips.waves
+        if self.strips.odds is not None:
             # nor do a strip's own bins tell its slope where the step is low; and odds vary as the albedo does
             self.spread[1:] = np.maximum(self.spread[1:], [self.strips.gradient(levels), self.spread[0]])
         self.slow_spread = max(self.strips.slow_gradient(levels), float(self.smallest[1]))
 
     def _learn_slow_levels(self, part: Eliminated) -> Array:
         """The levels that vary slowly `[5 T]`, once they have told how much they do (MacKay 1992)."""
-        count = len(self.strips.waves)
-        slow = self.slow[count : 2 * count]
-        first = len(part.gradient) - 2 * count
+        slow, count = self._slow_levels, len(self.strips.waves)
+        first = len(part.gradient) - len(self.slow) + count
         variance = np.diag(inverse(part.information))[first : first + count]
         known = max(float(np.sum(np.maximum(1.0 - variance / self.slow_level**2, 0.0))), 1.0)
         self.slow_level = float(np.clip(np.linalg.norm(slow) / math.sqrt(known), self.smallest[0], EDGE.level))

@@ -27,6 +27,7 @@ class Strips:
     #: how the log light changes with the log odds of the light from under the retina `[N]`, where there is any: a strip
     #: has odds of its own, since what lies before the pigment reflects and what lies behind it are not one albedo
     odds: Array | None = None
+    sloping: bool = False  #: whether the edge is a slope rather than a step
 
     @property
     def count(self) -> int:
@@ -41,13 +42,21 @@ class Strips:
     def slow(self) -> Array:
         """What varies with harmonics 0 to 2 around each outline, the pose's, at each bin: slopes, levels and odds.
 
-        `[5 T, N]`, and with odds `[15 T, N]`. Without them a step in the light is so high that what a prior of strips
-        which know nothing of each other leaves of smooth levels moves no edge.
+        `[5 T, N]`, along a slope `[10 T, N]` and with odds `[15 T, N]`. Without them a step in the light is so high
+        that what a prior of strips which know nothing of each other leaves of smooth levels moves no edge. A slope it
+        moves: to such a prior one wave of levels is as unlikely as noise of their size, and a turned axis likelier.
         """
-        if self.odds is None:
+        if not self.slow_levels:
             return self._slow_slopes
         levels = self.waves[:, self.index]
+        if self.odds is None:
+            return np.concatenate([self._slow_slopes, levels])
         return np.concatenate([self._slow_slopes, levels, levels * self.odds])
+
+    @property
+    def slow_levels(self) -> int:
+        """How many quantities beside the slopes vary slowly: none, levels, or levels and odds."""
+        return int(self.sloping) if self.odds is None else 2
 
     @cached_property
     def _slow_slopes(self) -> Array:
