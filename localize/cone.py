@@ -14,6 +14,8 @@ from conespot.localize.model.estimate import Estimate
 from conespot.localize.model.knowns import Knowns
 from conespot.localize.model.noise import NoiseModel
 from conespot.localize.outcome import LocalizationFailure, Outcome
+from conespot.localize.spot.fit import fit_spot
+from conespot.localize.spot.window import is_spot
 from conespot.localize.start.search import Start
 from conespot.localize.verdict import judged
 from conespot.scene.scene import Scene
@@ -41,6 +43,8 @@ def edge_outcome(
     frame: Frame, start: Estimate, knowns: Knowns, noise: NoiseModel, reference: Reference | None = None
 ) -> Outcome:
     """The localization from the edge fit near a start, or why it may not be believed."""
+    if is_spot(start):
+        return spot_outcome(frame, start, knowns, noise)
     fit = fit_edge(frame, start, knowns, noise, reference)
     return fit if isinstance(fit, LocalizationFailure) else judged_edge(fit, start.scene)
 
@@ -51,4 +55,15 @@ def judged_edge(fit: EdgeFit, scene: Scene) -> Outcome:
         fit.estimate, fit.covariance, scene, fit.knowns,
         misfit=fit.misfit, covered=fit.covered, settled=fit.settled,
         suspicions=lambda: fit.suspicions(scene),
+    )  # fmt: skip
+
+
+def spot_outcome(frame: Frame, start: Estimate, knowns: Knowns, noise: NoiseModel) -> Outcome:
+    """The localization from all of a patch that is hardly larger than what spreads it, or why not to believe it."""
+    fit = fit_spot(frame, start, knowns, noise)
+    if isinstance(fit, LocalizationFailure):
+        return fit
+    return judged(
+        fit.here.estimate, fit.covariance, start.scene, fit.knowns,
+        misfit=fit.piece.misfit, covered=fit.covered, settled=fit.settled,
     )  # fmt: skip

@@ -16,6 +16,7 @@ from conespot.localize.model.knowns import Knowns
 from conespot.localize.model.noise import NoiseModel
 from conespot.localize.model.view import outlines
 from conespot.localize.outcome import COMPRESSED, GLOWS, Localization, LocalizationFailure, Outcome
+from conespot.localize.spot.start import spot_start
 from conespot.localize.start.search import Start, believed, find_starts
 from conespot.localize.verdict import MISFIT, WRONG_BEAM, WRONG_WALL
 from conespot.scene.pose import Pose
@@ -32,6 +33,9 @@ def answered(frame: Frame, scene: Scene, reference: Reference | None, knowns: Kn
     A scene may say nothing of light from under the retina. Where the frame shows some, the scene is taken to have what
     is usual: the answer is then that scene's, or none, unless the `knowns` say that there is exactly none.
     """
+    spot = spot_start(frame, scene, reference)
+    if spot is not None:
+        return _answered(frame, scene, (spot,), localized)[0]
     starts = find_starts(frame, scene, reference)
     lit = None if knowns.deep_amount_sigma == 0.0 else glowing(scene)
     if lit is None:

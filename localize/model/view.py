@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import cv2
 import numpy as np
@@ -221,8 +222,11 @@ class Bins:
             to = sight.points - estimate.pose.apex
             cosines = to @ spotlight_axes(estimate.pose, scene.spotlights).T
             self.seen &= np.argmax(cosines, axis=1) == spotlight
-        there = sight.part(self.lit)
-        self._irradiance = Irradiance(there, pixels[self.lit], at.side, estimate, knowns, near[self.lit])
+        self._made_of = sight.part(self.lit), pixels[self.lit], at.side, estimate, knowns, near[self.lit]
+
+    @cached_property
+    def _irradiance(self) -> Irradiance:
+        return Irradiance(*self._made_of)
 
     def spotlight(self, estimate: Estimate, knowns: Knowns | None = None) -> Lights:
         """The spotlights' irradiance on the lit bins, with derivatives by all that is free."""

@@ -25,6 +25,8 @@ INNER_ROOMS = {
     "start": {"model"},
     "edge": {"model"},
     "field": {"model"},
+    # takes the albedo out as the field's fit does, and is a start as well
+    "spot": {"model", "field", "start"},
     "theory": {"model"},
     "frames": set(),
     # follows with the fits of the localizers, and searches as they do

@@ -1,0 +1,41 @@
+"""The tuned numbers of the spot's fit."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True)
+class SpotSettings:
+    """Tuned numbers of the spot's fit; `campaign run near_retina` judges them together."""
+
+    #: what spreads the image across a patch's edge (a standard deviation), over the patch's radius, from which on its
+    #: edge is no edge of its own any more: in `theatre` that of tips nearer than 1.5 mm
+    wide: float = 0.15
+    #: by which factor a ring may be larger than the patch it is on: a clipped one glows beyond its rim
+    larger: float = 1.6
+    #: bins across a patch, at most: half of what spreads it
+    bins: int = 24
+    #: how far beyond the outline a window goes: standard deviations of what spreads the image, and shares of its size
+    around: float = 3.0
+    margin: float = 0.2
+    #: directions over half a turn in which the way is first looked for, and how long it is there over the standard
+    #: deviation of one of its coordinates: the mean length of two
+    directions: int = 4
+    first_way: float = 1.4
+    #: of the brightest light, by how much an even retina is off; and the most evaluations of the light with it
+    even: float = 0.02
+    first_steps: int = 12
+    #: share of the light's variance in the window that a spot explains: of twelve frames of `theatre`, 0.998 at least
+    explained: float = 0.95
+    #: by how much the tip's coordinates are off where the model alone is [mm]: of light of a hundred places of a core
+    #: and sixteen of a tremor's way, in eight poses 0.25 to 1 mm from the wall, distances are at most 2 um off, 1.1 rms
+    model_mm: float = 1.2e-3
+    #: steps of the last fit, at most, and the longest of the tip along a coordinate [mm]
+    steps: int = 25
+    longest_step_mm: float = 0.1
+    #: a step this short [sigmas] ends it: what is left is below the noise
+    done_sigmas: float = 0.1
+
+
+SPOT = SpotSettings()
