@@ -58,7 +58,9 @@ class SpotFit:
         meat = self.piece.scatter(self.step, bread)
         meat[:size, :size] += self.prior
         found = (bread @ meat @ bread)[: size - 3, : size - 3]
-        found[range(3), range(3)] += SPOT.model_mm**2
+        pose, scene = self.here.estimate.pose, self.here.estimate.scene
+        near = SPOT.near_mm3 / float(scene.eye.intersect(pose.apex, pose.axis)) ** 2
+        found[:3, :3] += SPOT.model_mm**2 * np.eye(3) + near**2 * np.outer(pose.axis, pose.axis)
         return np.asarray(found)
 
 

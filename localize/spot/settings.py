@@ -28,9 +28,12 @@ class SpotSettings:
     first_steps: int = 12
     #: share of the light's variance in the window that a spot explains: of twelve frames of `theatre`, 0.998 at least
     explained: float = 0.95
-    #: by how much the tip's coordinates are off where the model alone is [mm]: of light of a hundred places of a core
-    #: and sixteen of a tremor's way, in eight poses 0.25 to 1 mm from the wall, distances are at most 2 um off, 1.1 rms
+    #: by how much the model alone is off: each coordinate of the tip [mm], and along the needle as the inverse square
+    #: of its distance from the wall [mm^3]. Of light of ninety places of a core and twelve instants in `theatre`'s
+    #: optics distances are 6 to 7 um off at 0.15 mm, 1 to 2 at 0.3 and 0.1 at 0.6, and in eight ways of a tremor, which
+    #: are not quite straight, at most 2, 1.1 rms
     model_mm: float = 1.2e-3
+    near_mm3: float = 1.6e-4
     #: steps of the last fit, at most, and the longest of the tip along a coordinate [mm]
     steps: int = 25
     longest_step_mm: float = 0.1
