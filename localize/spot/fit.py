@@ -64,6 +64,18 @@ class SpotFit:
         return np.asarray(found)
 
 
+@dataclass(frozen=True)
+class _Modelled:
+    """The noise of a sensor, and of a model that is off by a deviation [white]."""
+
+    sensor: NoiseModel
+    off: float
+
+    def variance(self, signal: Array) -> Array:
+        """Variance of one pixel [white^2]."""
+        return self.sensor.variance(signal) + self.off**2
+
+
 def fit_spot(frame: Frame, start: Estimate, knowns: Knowns, noise: NoiseModel) -> SpotFit | LocalizationFailure:
     """The fit near a start, or why there is none."""
     first = first_fit(frame, start)
@@ -75,7 +87,9 @@ def fit_spot(frame: Frame, start: Estimate, knowns: Knowns, noise: NoiseModel) -
     lead, shown = lead_of(frame, at)
     light, bins = SpotLight(at, nominal), Bins(at, here.estimate, used, 0)
     pitch = nominal.camera.pixel_pitch * at.side
-    piece = Piece(shown, lead, bins, Modes.over(at.height, at.width, pitch), noise, FIELD.fundus)
+    # a bin is off as a whole, and its pixels' noise is not
+    whole = _Modelled(noise, SPOT.light * float(np.ptp(shown[lead].signal)) * at.side)
+    piece = Piece(shown, lead, bins, Modes.over(at.height, at.width, pitch), whole, FIELD.fundus)
     value, rows = light(here, used.free, lead)
     gain = piece.begin(value[bins.lit])
     size = len(rows)
