@@ -26,8 +26,8 @@ class SpotSettings:
     #: of the brightest light, by how much an even retina is off; and the most evaluations of the light with it
     even: float = 0.02
     first_steps: int = 12
-    #: share of the light's variance in the window that a spot explains: of twelve frames of `theatre` 0.998 at least, of
-    #: a cone of light 0.982 and of an even disc 0.9
+    #: share of the light's variance in the window that a spot explains: of twelve frames of `theatre` 0.998 at least,
+    #: of a cone of light 0.982 and of an even disc 0.9
     explained: float = 0.99
     #: by how much the model alone is off: each coordinate of the tip [mm], and along the needle as the inverse square
     #: of its distance from the wall [mm^3]. Of light of ninety places of a core and twelve instants in `theatre`'s
