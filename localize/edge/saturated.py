@@ -58,7 +58,13 @@ class SaturatedFit(EdgeFit):
         parts = np.einsum("s,sp,sq->spq", weights, self.rows, self.rows)
         reduced = reduction(parts.sum(axis=0) + _contrast_prior(size, self.contrast_spread), size)
         scores = (weights * self.residual)[:, None] * self.rows @ reduced.T / follows(weights, self.residual)
-        seen = score_covariance(self.strips, scores, reduced @ parts @ reduced.T)
+        parts = reduced @ parts @ reduced.T
+        seen = score_covariance(self.strips, scores, parts)
+        count = self.strips.count
+        if count < EDGE.fewest_strips:
+            # a fit follows a few strips by as many as it takes to hold it, and leaves them closer than they are
+            followed = float(np.trace(np.linalg.solve(self.information, parts.sum(axis=0))))
+            seen = seen * count / max(count - followed, 1.0)
         known = self.prior.T @ self.prior + reduced @ _contrast_prior(size, self.contrast_spread) @ reduced.T
         return np.asarray(seen + known)
 

@@ -81,7 +81,7 @@ class SpotLight:
         radius, beta = scene.beam.source_diameter / 2.0, scene.beam.half_angle
         places = radius * (_PLACES if radius > 0.0 else _PLACES[:1])
         instants = _INSTANTS if np.any(here.way) else (0.0,)
-        even = self._bin**2 / 12.0 + lens_variance(scene) + radius**2 / (4.0 * len(places))
+        even = np.asarray(self._bin**2 / 12.0 + lens_variance(scene) + radius**2 / (4.0 * len(places)))
         if len(sight.confusion):
             even = even + sight.confusion * (self._bin / sight.side) ** 2 / 4.0
         part = here.way / len(instants)
@@ -121,9 +121,7 @@ class SpotLight:
         return np.asarray((1.0 - share) * local + share * spread.reshape(len(local), -1))
 
 
-def _cone(
-    sight: Sight, apex: Array, axis: Array, beta: float, even: Array | float, way: Array
-) -> tuple[Array, Array, Array]:
+def _cone(sight: Sight, apex: Array, axis: Array, beta: float, even: Array, way: Array) -> tuple[Array, Array, Array]:
     """Irradiance `[N]` of a cone of half angle `beta`, and its derivatives by apex and axis `[3, N]`.
 
     It is spread by a Gaussian of the variance `even` [mm^2] and along a `way` [mm].
