@@ -42,8 +42,6 @@ _NEVER = "camera's lens: take OpenCV's calibration of the microscope as camera: 
 #: what is asked about only with an option
 _UNASKED = "camera's tilt: give --tilt to have it asked for"
 _EXACT_MM = 1e-9
-#: kinds of quantities by the unit of a sigma
-_KINDS = {"deg": "angle", "mm": "length"}
 _WIDTH = 110
 #: how far a camera may lean otherwise than told, towards +x and towards +y [deg]
 _TILT_DEG = 2.0
@@ -130,8 +128,8 @@ def _known(knowledge: Knowledge, found: Calibration, deep: SharedDeep | None, wi
     for quantity, sigma in zip(QUANTITIES, found.sigmas, strict=False):
         field = _field(quantity.known)
         if found.observable[quantity.name] and field in known:
-            worst[field] = max(worst.get(field, 0.0), float(f"{sigma:.3g}"))
-            known[field] = format_quantity(worst[field], _KINDS[quantity.unit]) if quantity.unit else worst[field]
+            worst[field] = max(worst.get(field, 0.0), float(f"{sigma / quantity.per_unit:.3g}"))
+            known[field] = f"{worst[field]:g} {quantity.unit}" if quantity.unit else worst[field]
     if all(found.observable[name] for name in NAMES[-3:]):
         sideways = math.hypot(width.play_mm, float(max(found.sigmas[-3:])))
         known["rcm_sigma"] = format_quantity(float(f"{sideways:.3g}"), "length")
