@@ -10,7 +10,7 @@ from conespot.scene import srgb
 from conespot.scene.document import InputError
 from conespot.scene.emva import Emva
 from conespot.scene.scene import Scene
-from conespot.scene.sensor import Linear, Recorded, Srgb8
+from conespot.scene.sensor import SENSORS, AnySensor, Linear, Recorded, Srgb8
 
 _CHANNELS = ("red", "green", "blue")
 
@@ -62,6 +62,11 @@ def _channels(name: str, pixels: Pixels, scene: Scene) -> Pixels:
     )
 
 
+def as_camera(sensor: AnySensor) -> str:
+    """How a recorded sensor's scene names the camera that is now the whole sensor: by its name, or as it is written."""
+    return sensor.kind if sensor.kind in SENSORS else f"{{kind: {sensor.kind}, and what else stands there now}}"
+
+
 def _check_range(name: str, stored: Stored, scene: Scene) -> None:
     sensor = scene.sensor
     if isinstance(sensor, Recorded):
@@ -71,7 +76,7 @@ def _check_range(name: str, stored: Stored, scene: Scene) -> None:
     if stored.span == "limited":
         raise InputError(
             f"{name}: says it is of limited range (black 16, white 235); write scene.sensor: {{kind: recorded, camera:"
-            f" {sensor.kind}, range: limited}}"
+            f" {as_camera(sensor)}, range: limited}}"
         )
 
 

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 
+from conespot.localize.frames.fit import as_camera
 from conespot.localize.frames.stored import Pixels, Stored, Turn, check_size
 from conespot.scene.document import InputError
 from conespot.scene.scene import Scene
@@ -102,7 +103,7 @@ def _span(name: str, frame: VideoFrame, scene: Scene) -> Literal["full", "limite
     if stated is None:
         raise InputError(
             f"{name}: does not say whether its range is full or limited; write scene.sensor: {{kind: recorded, camera:"
-            f" {scene.sensor.kind}, range: limited}} (or full)"
+            f" {as_camera(scene.sensor)}, range: limited}} (or full)"
         )
     return "limited" if stated == "limited" else "full"
 

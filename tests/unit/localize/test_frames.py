@@ -185,6 +185,8 @@ def test_the_colours_of_a_film_of_limited_range_are_the_recorders_codes(tmp_path
     np.testing.assert_allclose(codes[5, 5], recorder.code(np.array([200, 100, 50]) / 255), atol=1.5)
     with pytest.raises(InputError, match="write scene.sensor: {kind: recorded, camera: srgb8, range: limited}"):
         read(film, sensor="srgb8-colour")
+    with pytest.raises(InputError, match="camera: {kind: emva, and what else stands there now}, range: limited}"):
+        read(film, sensor={"kind": "emva", "chip": "cmv12000-rgb", "bits": 8, "gain": 0.02})
 
 
 def test_a_folder_is_read_in_the_order_of_its_numbers_and_the_rest_of_it_left(tmp_path):
