@@ -6,6 +6,8 @@ is their own. Not an ellipse, and no threshold after the start.
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 from conespot.localize.doubt import answered, noise_of
 from conespot.localize.edge.fit import fit_edge
 from conespot.localize.edge.sandwich import EdgeFit
@@ -13,7 +15,7 @@ from conespot.localize.image import AnyImage, Frame, Reference
 from conespot.localize.model.estimate import Estimate
 from conespot.localize.model.knowns import Knowns
 from conespot.localize.model.noise import NoiseModel
-from conespot.localize.outcome import LocalizationFailure, Outcome
+from conespot.localize.outcome import Localization, LocalizationFailure, Outcome
 from conespot.localize.spot.fit import fit_spot
 from conespot.localize.spot.window import is_spot
 from conespot.localize.start.search import Start
@@ -51,11 +53,12 @@ def edge_outcome(
 
 def judged_edge(fit: EdgeFit, scene: Scene) -> Outcome:
     """The localization from an edge fit in a scene, or why it may not be believed."""
-    return judged(
+    outcome = judged(
         fit.estimate, fit.covariance, scene, fit.knowns,
         misfit=fit.misfit, covered=fit.covered, settled=fit.settled,
         suspicions=lambda: fit.suspicions(scene),
     )  # fmt: skip
+    return replace(outcome, likelihood=fit.likelihood) if isinstance(outcome, Localization) else outcome
 
 
 def spot_outcome(frame: Frame, start: Estimate, knowns: Knowns, noise: NoiseModel) -> Outcome:

@@ -96,6 +96,11 @@ class BandFit(EdgeFit):
         """Rms of the residuals, outliers cut, over what the model expects."""
         return float(np.sqrt(np.mean(np.square([channel.misfit for channel in self.channels]))))
 
+    @property
+    def likelihood(self) -> float:
+        """Log-likelihood of the bins, one in the mean."""
+        return float(np.mean([channel.likelihood for channel in self.channels]))
+
     def scatter(self) -> Array:
         """Covariance of the gradient `[P, P]` as the strips' residuals show it."""
         scores, parts, known = self._strips(self.channels, self.prior)

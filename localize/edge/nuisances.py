@@ -15,6 +15,7 @@ from conespot.localize.model.residual import (
     censored,
     follows,
     incident_light,
+    log_likelihood,
     log_residuals,
     rest,
     rms,
@@ -71,6 +72,7 @@ class Nuisances:
         variance = variance + self.white**2
         whitened = residual / np.sqrt(variance)
         self.misfit = rms(whitened[use])
+        self._left = whitened, variance, use
         worth = use.astype(float)
         if shown.clipped.any():
             over, beyond = shown.clipped, -np.log(np.maximum(model[shown.clipped], 1e-6))
@@ -88,6 +90,12 @@ class Nuisances:
         """Take what bins show over the model's brightness `[N]` for the albedo."""
         self.level, self.levels = first_levels(self.shown, self.strips, brightness, len(self.spread))
         self.slow, self.slow_spread = np.zeros(len(self.strips.slow)), float(self.spread[1])
+
+    @property
+    def likelihood(self) -> float:
+        """Log-likelihood of the bins where they were last evaluated, one in the mean."""
+        whitened, variance, use = self._left
+        return log_likelihood(whitened[use], variance[use])
 
     @property
     def precision(self) -> Array:

@@ -34,6 +34,11 @@ class EdgeFit(ABC):
     def misfit(self) -> float:
         """Rms of the residuals, outliers cut, over what the model expects."""
 
+    @property
+    def likelihood(self) -> float | None:
+        """Log-likelihood of the bins, one in the mean; None for a fit that counts no bins."""
+        return None
+
     @abstractmethod
     def scatter(self) -> Array:
         """Covariance of the gradient `[P, P]` as the residuals show it, priors included."""

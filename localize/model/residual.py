@@ -113,6 +113,12 @@ def rms(whitened: Array) -> float:
     return float(np.sqrt(np.mean(np.minimum(np.square(whitened), RESIDUAL.gross**2)))) if len(whitened) else math.inf
 
 
+def log_likelihood(whitened: Array, variance: Array) -> float:
+    """Of normal residuals, one in the mean, gross ones cut: `whitened` `[N]` were residuals of the `variance` `[N]`."""
+    squares = np.minimum(np.square(whitened), RESIDUAL.gross**2)
+    return float(-0.5 * np.mean(squares + np.log(2.0 * math.pi * variance))) if len(whitened) else -math.inf
+
+
 def median(values: Array) -> float:
     """The median of values of any shape, as numpy has it in a tenth of its time; not a number where one is none."""
     half, odd = divmod(values.size, 2)

@@ -171,12 +171,16 @@ def believed(starts: Iterable[Start], scene: Scene, localized: Callable[[Start],
 def _contradict(best: tuple[Start, Localization], other: tuple[Start, Localization], scene: Scene) -> bool:
     """Whether two answers may both be right and are not the same.
 
-    A rig turned into its neighbours' places fits them too, but badly: its residuals leave the tip far less sure.
+    A rig turned into its neighbours' places fits them too, but badly: its residuals leave the tip far less sure, or
+    make what the edges' bins show far less likely.
     """
     if float(np.linalg.norm(best[1].apex_mm - other[1].apex_mm)) <= START.apart_mm:
         return False
     if len(scene.spotlights) == 1 or not other[0].touches(best[0], scene):
         return True
+    likely, unlikely = best[1].likelihood, other[1].likelihood
+    if likely is not None and unlikely is not None and unlikely < likely - START.less_likely:
+        return False
     sure, unsure = (math.sqrt(float(np.trace(np.asarray(found.covariance)[:3, :3]))) for _, found in (best, other))
     return unsure <= START.less_sure * sure
 

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from scipy.stats import norm
 
 from conespot.localize import Knowns, SensorNoise
 from conespot.localize.edge.fit import fit_edge
@@ -15,6 +16,7 @@ from conespot.localize.image import Frame
 from conespot.localize.model.estimate import Estimate
 from conespot.localize.model.forward import ambient_irradiance, light, moved
 from conespot.localize.model.profile import Profile
+from conespot.localize.model.residual import RESIDUAL, log_likelihood
 from conespot.localize.model.sight import look, window
 from conespot.localize.model.view import outline
 from conespot.localize.theory.bounds import cramer_rao
@@ -228,3 +230,23 @@ def test_bins_whose_light_the_iris_cuts_take_no_part():
     followed = [Rim.about(outline(at, k, 64), scene, 1, 4.0, 4.0) is not None for k in range(3)]
     assert followed == [seen_whole(scene.camera, outline(at, k, 64)).all() for k in range(3)]
     assert set(followed) == {True, False}
+
+
+def test_a_mean_log_likelihood_is_that_of_normal_residuals_with_gross_ones_cut():
+    """Against scipy's normal density; what is 40 sigmas off counts as it does at the cut."""
+    rng = np.random.default_rng(0)
+    sigma = rng.uniform(0.02, 0.3, 500)
+    whitened = np.append(rng.standard_normal(499), 40.0)
+    kept = np.clip(whitened, -RESIDUAL.gross, RESIDUAL.gross)
+    expected = norm.logpdf(kept * sigma, scale=sigma).mean()
+    assert log_likelihood(whitened, np.square(sigma)) == pytest.approx(expected, rel=1e-12)
+
+
+def test_an_edge_over_vessels_is_less_likely_than_over_an_even_retina():
+    scene = Scene(beam=HardBeam(), camera=Camera(resolution=1000), sensor=Linear(bits=12))
+    pose = scene.pose(TIPS[0])
+    even, striped = (
+        fitted(counted(scene, pose, 1, *albedo), scene, near(pose, 1), Knowns(0.01), NOISE)
+        for albedo in ((), (vessels,))
+    )
+    assert even.likelihood > striped.likelihood + 0.1

@@ -1,6 +1,7 @@
 """The start on frames cast pixel by pixel: a bright disc, rims cut by the frame, several patches, no patch."""
 
 import math
+from dataclasses import replace
 from functools import lru_cache
 from itertools import pairwise
 
@@ -292,3 +293,22 @@ def test_a_rig_in_its_neighbours_places_that_leaves_the_tip_far_less_sure_is_no_
         assert np.array_equal(outcome.apex_mm, here.apex)
     else:
         assert outcome == LocalizationFailure(TWO_PLACES)
+
+
+@pytest.mark.parametrize(
+    ("more", "rig", "expected"),
+    [(-0.3, "triple", True), (-0.05, "triple", False), (0.3, "triple", False), (-0.3, "single", False)],
+)
+def test_a_rig_in_its_neighbours_places_that_makes_the_bins_far_less_likely_is_no_second_answer(more, rig, expected):
+    scene = scene_of(spotlights=rig)
+    here = scene.pose(np.array(TIPS[0]))
+    turned = Pose(here.apex + [0.15, 0.0, 0.0], here.axis, here.roll + 2.1)
+    starts = [Start(pose, 0.7, 0.9, worth) for pose, worth in ((here, 1.2), (turned, 1.0))]
+
+    def answer(start):
+        covariance = 1e-4 * np.eye(5 if rig == "single" else 6)
+        likelihood = 1.7 + (more if start is starts[1] else 0.0)
+        found = Localization(start.pose.apex, start.pose.axis, covariance, roll=start.pose.roll)
+        return replace(found, likelihood=likelihood)
+
+    assert isinstance(believed(starts, scene, answer), Localization) == expected
