@@ -65,8 +65,9 @@ class Localization:
     of `Pose.rotation()`, or `[6, 6]` with the roll [rad] behind them. `spread_mm` is the root mean square distance
     of several spotlights' positions from their mean, None where there was one estimate. `roll` [rad] is as in `Pose`,
     None for localizers that do not measure it. `distance` is the tip's from the wall, which `locate` adds. `camera` is
-    the one that the answer belongs to, where the fit found it to stand otherwise than told. `likelihood` is the log-likelihood of an
-    edge's bins, one in the mean: it compares answers to one frame, and is None where the fit was no band of bins.
+    the one that the answer belongs to, where the fit found it to stand otherwise than told. `likelihood` is the
+    log-likelihood of an edge's bins, one in the mean: it compares answers to one frame, and is None where the fit was
+    no band of bins.
     """
 
     apex_mm: Array

@@ -231,16 +231,9 @@ def fit_band(
         own, pull, _ = _equations(again, irradiance, shed(estimate, free), prior)
         doubt = contradicted(own, pull, estimate, free, knowns)
     return BandFit(
-        estimate,
-        information,
-        pj,
-        step,
-        band.covered,
-        knowns,
-        tuple(channels),
-        doubt,
+        estimate, information, pj, step, band.covered, knowns, tuple(channels), doubt,
         Seen(sight, band.pixels, side, irradiance),
-    )
+    )  # fmt: skip
 
 
 def _within_bounds(information: Array, gradient: Array, at: Estimate, knowns: Knowns) -> Array | None:
