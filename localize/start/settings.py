@@ -148,7 +148,8 @@ class StartSettings:
     #: three frames of `theatre` with three spotlights have 5 to 9 times
     less_sure: float = 4.0
     #: and by how much its bins' log-likelihood, one in the mean, must be less: 0.38 in the one frame of `theatre` that
-    #: the tips' sigmas did not decide. A band's thousands of bins count as hundreds, since neighbours err together
+    #: the tips' sigmas do not decide, 0.08 in one that they do. A band's thousands of bins count as hundreds, since
+    #: neighbours err together
     less_likely: float = 0.1
     #: share of the gradients that a patch explains where nothing else is bright; a disc may explain nearly as much
     convincing: float = 0.6
