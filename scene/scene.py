@@ -219,6 +219,8 @@ class Scene(Model):
         """
         offset = np.asarray(points, float) - self.eye.centre
         distance = np.linalg.norm(offset, axis=-1)
+        if self.surface.is_sphere:
+            return np.asarray(self.eye.radius - distance)
         away = np.where(distance[..., None] > 0.0, offset, [0.0, 0.0, -1.0])
         direction = away / np.linalg.norm(away, axis=-1, keepdims=True)
         return np.asarray(self.eye.radius - self.surface.displacement(self.eye, direction) - distance)

@@ -130,7 +130,7 @@ def fit_again(
     here = beam(start.pose, before.blur or 0.0)
     if not np.all(np.isfinite(here.value)):
         return None
-    strips = Strips(rim.index, here.offset(start.profile.half_angle), rim.first, (slice(0, len(rim.first)),))
+    strips = Strips(rim.index, here.offset(scene.beam.half_angle), rim.first, (slice(0, len(rim.first)),))
     channels = [
         Channel(plane, strips, noise, irradiance, was, pixels=side**2, size=_ALL)
         for plane, was in zip(shown, before.channels, strict=True)

@@ -17,7 +17,6 @@ from conespot.localize.edge.settings import EDGE
 from conespot.localize.edge.strips import Strips, strip_scores
 from conespot.localize.model.noise import NoiseModel
 from conespot.localize.model.residual import RESIDUAL, follows, incident_light, median, rest, rms
-from conespot.localize.model.solve import solved
 from conespot.localize.model.view import Shown
 
 Array = NDArray[np.float64]
@@ -152,8 +151,8 @@ class Channel:
         self._information = normal[:count]
         own = np.arange(size, count)
         self._information[own, own] += self._precision
-        taken = np.linalg.solve(self._information[size:, size:], self._information[size:])
-        self._taken = taken[:, :size]
+        self._inverse = np.linalg.inv(self._information[size:, size:])
+        self._taken = self._inverse @ self._information[size:, :size]
         information = self._information[:size, :size] - self._information[:size, size:] @ self._taken
         return information, self._shared(normal[count])
 
@@ -173,11 +172,8 @@ class Channel:
     def learn(self, step: Array) -> None:
         """Take a step `[size]` of what is shared, and what it means for the channel's own."""
         size = self._size
-        own = solved(self._information[size:, size:], self._gradient[size:] - self._information[size:, :size] @ step)
-        if own is not None:
-            step = np.concatenate([step, np.clip(own, -1.0, 1.0)])
-        else:
-            step = np.concatenate([step, np.zeros(len(self._precision))])
+        own = self._inverse @ self._gradient[size:] - self._taken @ step
+        step = np.concatenate([step, np.clip(own, -1.0, 1.0)])
         self._gain += float(step[size])
         self._level += float(step[size + 1])
         self._slow = self._slow + step[size + 2 :]

@@ -25,7 +25,6 @@ class Rim:
 
     window: Window  #: that the bins are in
     cells: tuple[NDArray[np.intp], NDArray[np.intp]]  #: their rows and columns there
-    pixels: Array  #: their centres `[N, 2]` [px]
     index: NDArray[np.intp]  #: the strip of each, increasing `[N]`
     first: NDArray[np.intp]  #: each strip's first bin `[S]`
 
@@ -40,7 +39,7 @@ class Rim:
         out = math.ceil(outer) + 1
         low = np.floor(points.min(axis=0)).astype(int) - out
         high = np.ceil(points.max(axis=0)).astype(int) + out + 1
-        if np.any(low < 0) or np.any(high > edge) or np.any(high - low < 4):
+        if min(low) < 0 or any(high > edge) or min(high - low) < 4:
             return None
         if not seen_whole(scene.camera, curve).all():
             return None
@@ -53,7 +52,7 @@ class Rim:
         if len(row) < EDGE.fewest_bins:
             return None
         middle = points.mean(axis=0) - low
-        perimeter = float(np.sum(np.hypot(*np.diff(points, axis=0, append=points[:1]).T)))
+        perimeter = cv2.arcLength(points.astype(np.float32), True)
         count = max(8, int(perimeter / WIDTH))
         turn = cv2.phase((column - middle[0]).astype(np.float32), (row - middle[1]).astype(np.float32))
         strip = np.minimum((turn * (count / (2.0 * math.pi))).astype(np.intp), count - 1)
@@ -61,5 +60,4 @@ class Rim:
         row, column, strip = row[order], column[order], strip[order]
         new = np.append(True, strip[1:] != strip[:-1])
         window = Window(int(low[1]) * side, int(low[0]) * side, mask.shape[0], mask.shape[1], side)
-        pixels = (np.stack([column + low[0], row + low[1]], axis=1) + 0.5) * side
-        return cls(window, (row, column), pixels, np.cumsum(new) - 1, np.flatnonzero(new))
+        return cls(window, (row, column), np.cumsum(new) - 1, np.flatnonzero(new))

@@ -136,6 +136,12 @@ class Profile:
         return found
 
     @cached_property
+    def powers(self) -> list[tuple[int, Array]]:
+        """The powers n that there are, and what each knot adds `[S]` of (w - knot)^n / n!."""
+        degrees = np.flatnonzero(self.jumps.any(axis=0)).tolist()
+        return [(n, self.jumps[:, n] * math.factorial(n)) for n in degrees]
+
+    @cached_property
     def _once(self) -> Array:
         return _integrate(self.knots, self.coefficients)
 

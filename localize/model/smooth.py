@@ -117,15 +117,19 @@ def ladder(profile: Profile, w: Array, sigma: Array, orders: range) -> Array:
 
 def under_gaussian(profile: Profile, w: Array, sigma: Array, derivatives: int) -> list[Array]:
     """The profile under Gaussians `[N]` and so many derivatives: the first rungs of a `ladder`, all knots at a time."""
-    t = (w - profile.knots[:, None]) / sigma
-    steps = _rungs(t, profile.jumps.shape[1] - 1)
-    found = []
-    for order in range(derivatives + 1):
-        total: Array | float = 0.0
-        for degree in np.flatnonzero(profile.jumps.any(axis=0)).tolist():
-            size = profile.jumps[:, degree] * math.factorial(degree)
-            total = total + (size @ steps[degree - order]) * sigma ** (degree - order)
-        found.append(np.asarray(total))
+    first, last = profile.knots[0], profile.knots[-1]
+    reach = _FAR * sigma
+    near = np.flatnonzero((w > first - reach) & (w < last + reach))
+    # beyond the last knot every profile is constant, before the first it is dark
+    found = [np.where(w < last, 0.0, profile.coefficients[-1, 0]), *(np.zeros_like(w) for _ in range(derivatives))]
+    s = sigma[near]
+    steps = _rungs((w[near] - profile.knots[:, None]) / s, profile.jumps.shape[1] - 1)
+    powers: dict[int, Array | float] = {3: s * s * s, 2: s * s, 1: s, 0: 1.0, -1: 1.0 / s, -2: 1.0 / (s * s)}
+    for order, whole in enumerate(found):
+        total = np.zeros_like(s)
+        for degree, size in profile.powers:
+            total += (size @ steps[degree - order]) * powers[degree - order]
+        whole[near] = total
     return found
 
 
