@@ -55,14 +55,14 @@ class Seen:
         every = np.ones(len(self.pixels), bool)
         return Irradiance(self.sight, self.pixels, self.side, estimate, knowns, every)(estimate)
 
-    def softer(self, estimate: Estimate) -> Array | None:
-        """How the irradiance changes as a hard edge gets soft `[N]`; None for others, which have a softness."""
+    def softer(self, estimate: Estimate, hard: Array) -> Array | None:
+        """How the irradiance `hard` `[N]` changes as the edge gets soft; None of others, which have a softness."""
         beam = estimate.scene.beam
         if not isinstance(beam, HardBeam):
             return None
         soft = CyclesBeam(half_angle=beam.half_angle, blend=EDGE.softer)
         there = Estimate(estimate.pose, estimate.scene.model_copy(update={"beam": soft}))
-        hard, softened = (self.lights(e, Knowns().within(e.scene))[0][0] for e in (estimate, there))
+        softened = self.lights(there, Knowns().within(there.scene))[0][0]
         return np.asarray((softened - hard) / EDGE.softer)
 
 
@@ -129,7 +129,7 @@ class BandFit(EdgeFit):
         own = [pose_size + i for i, q in enumerate(wide.free) if q not in fixed]
         last = [pose_size + i for i, q in enumerate(wide.free) if q in fixed]
         order, names = [*range(pose_size), *own, *last], [q.name for q in fixed]
-        softer = self.seen.softer(self.estimate)
+        softer = self.seen.softer(self.estimate, lights[0][0])
         if softer is not None:
             names.append("edge")
         also = [] if softer is None else [softer[None]]
