@@ -184,5 +184,8 @@ def _line(names: FrameNames, group: Group, case: Case, pose: int, scene: Scene, 
         "half_angle_deg": math.degrees(scene.beam.half_angle),
         "spotlights": len(scene.spotlights),
         "is_plain": "yes" if camera.is_plain else "no",
-        **{f"{name}_sigma": sigmas[f"{name}_sigma"] for name in ("rcm", "half_angle", "eye_radius", "camera_height")},
+        **{
+            f"{name}_sigma": sigmas[f"{name}_sigma"]
+            for name in ("rcm", "half_angle", "eye_radius", "camera_height", "camera_tilt")
+        },
     }
