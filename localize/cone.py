@@ -17,9 +17,10 @@ from conespot.localize.model.knowns import Knowns
 from conespot.localize.model.noise import NoiseModel
 from conespot.localize.outcome import Localization, LocalizationFailure, Outcome
 from conespot.localize.spot.fit import fit_spot
+from conespot.localize.spot.settings import SPOT
 from conespot.localize.spot.window import is_spot
 from conespot.localize.start.search import Start
-from conespot.localize.verdict import judged
+from conespot.localize.verdict import MISFIT, judged
 from conespot.scene.scene import Scene
 
 
@@ -66,6 +67,8 @@ def spot_outcome(frame: Frame, start: Estimate, knowns: Knowns, noise: NoiseMode
     fit = fit_spot(frame, start, knowns, noise)
     if isinstance(fit, LocalizationFailure):
         return fit
+    if fit.explained < SPOT.explained:
+        return LocalizationFailure(MISFIT)
     return judged(
         fit.here.estimate, fit.covariance, start.scene, fit.knowns,
         misfit=fit.piece.misfit, covered=fit.covered, settled=fit.settled,

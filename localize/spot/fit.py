@@ -45,6 +45,7 @@ class SpotFit:
     step: Array  #: the last `[P + 1]`
     settled: bool  #: whether it was small
     knowns: Knowns  #: by which it was fitted
+    explained: float  #: share of the light's variance in the window that a spot over an even retina explains
 
     @property
     def covered(self) -> float:
@@ -117,7 +118,7 @@ def fit_spot(frame: Frame, start: Estimate, knowns: Knowns, noise: NoiseModel) -
         settled = length < STEP.settled_sigmas
         if length < SPOT.done_sigmas and count > 1:
             break
-    return SpotFit(here, piece, information, prior, step, settled, used)
+    return SpotFit(here, piece, information, prior, step, settled, used, first.explained)
 
 
 def _known(here: Moving, nominal: Scene, knowns: Knowns) -> tuple[Array, Array]:
