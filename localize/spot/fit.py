@@ -61,7 +61,8 @@ class SpotFit:
         found = (bread @ meat @ bread)[: size - 3, : size - 3]
         pose, scene = self.here.estimate.pose, self.here.estimate.scene
         near = SPOT.near_mm3 / float(scene.eye.intersect(pose.apex, pose.axis)) ** 2
-        found[:3, :3] += SPOT.model_mm**2 * np.eye(3) + near**2 * np.outer(pose.axis, pose.axis)
+        along = SPOT.along_mm**2 + near**2
+        found[:3, :3] += SPOT.model_mm**2 * np.eye(3) + along * np.outer(pose.axis, pose.axis)
         return np.asarray(found)
 
 

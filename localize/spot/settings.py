@@ -29,12 +29,14 @@ class SpotSettings:
     #: share of the light's variance in the window that a spot explains: of twelve frames of `theatre` 0.998 at least,
     #: of a cone of light 0.982 and of an even disc 0.9
     explained: float = 0.99
-    #: by how much the model alone is off: each coordinate of the tip [mm], and along the needle as the inverse square
-    #: of its distance from the wall [mm^3]. Of light of ninety places of a core and twelve instants in `theatre`'s
-    #: optics distances are 6 to 7 um off at 0.15 mm, 1 to 2 at 0.3 and 0.1 at 0.6, and in eight ways of a tremor, which
-    #: are not quite straight, at most 2, 1.1 rms
+    #: by how much the model alone is off: each coordinate of the tip [mm], and along the needle so much [mm] and as the
+    #: inverse square of its distance from the wall [mm^3]. Light of ninety places of a core and twelve instants in
+    #: `theatre`'s optics puts distances 6 to 7 um off at 0.15 mm, 1 to 2 at 0.3, and a tremor's way, not quite
+    #: straight, by 1.1 rms. Without the second and with half of the third 53 frames of near_retina's `theatre` erred by
+    #: 1.7 sigmas rms, 6 um along the needle; as it is, by 1.0. What the rest of it is is not known
     model_mm: float = 1.2e-3
-    near_mm3: float = 1.6e-4
+    along_mm: float = 3.6e-3
+    near_mm3: float = 3.5e-4
     #: of the brightest light, by how much a bin's is off where the model is: a foot that it has not counts for little
     light: float = 0.01
     #: steps of the last fit, at most, and the longest of the tip along a coordinate [mm]
