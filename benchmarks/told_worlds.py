@@ -2,10 +2,10 @@
 
 `python benchmarks/told_worlds.py ROWS.csv` renders frames with each effect alone and with all of them (`theatre`), and
 has `photometric` find their tips, told rightly, told wrongly (`WRONG` says how), wrongly but with its sigma (`SIGMAS`)
-and told nothing: that the world is `theatre-ideal`, its light and camera apart. The RCM is told with an error of 0.05
-mm along each axis, which is also its sigma. `--poses N` frames a cell, `--columns N` px, `--effects` by name. What is
-in ROWS.csv is not measured again, so that the command can be stopped and given again with more poses. Printed: the
-matrix of docs/localizers.md.
+and told nothing: that the world is `theatre-ideal`, its light and camera apart. `MORE` are worlds that are told wrongly
+and are in no effect: beam, camera, wall and transfer. The RCM is told with an error of 0.05 mm along each axis, which
+is also its sigma. `--poses N` frames a cell, `--columns N` px, `--effects` by name. What is in ROWS.csv is not measured
+again, so that the command can be stopped and given again with more poses. Printed: the matrix of docs/localizers.md.
 """
 
 from __future__ import annotations
@@ -20,13 +20,16 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.stats import binom, chi2
 
 from conespot.campaigns.schema import combinations, read_campaign
 from conespot.localize import Knowns, Localization, locate
+from conespot.localize.image import AnyImage
 from conespot.render import Exposure, Renderer
 from conespot.scene import Pose, Scene
 
+Array = NDArray[np.float64]
 #: what is told in place of the truth
 WRONG: dict[str, dict[str, Any]] = {
     "eye's optics": {"scene.camera.optics": {"eye": "navarro", "lens": "aphakic", "contact": "flat", "pupil": "8 mm"}},
@@ -56,11 +59,41 @@ WRONG: dict[str, dict[str, Any]] = {
         "scene.camera.optics": {"eye": "navarro", "lens": "aphakic", "contact": "flat", "pupil": "8 mm"},
     },
 }  # fmt: skip
+_RECORDED = {
+    "kind": "recorded", "quality": 90,
+    "camera": {"kind": "emva", "chip": "cmv12000-nir", "exposure_time": "8 ms", "f_number": 8.7},
+}  # fmt: skip
+_SOFT = {"scene.beam": {"kind": "cycles", "half_angle": "9 deg"}}
+#: without noise there must be light around a patch that stands out
+_LIT = {"scene.ambient.irradiance": "50 W/m2"}
+#: twice the brightest light
+_GAMMA: dict[str, Any] = {"kind": "srgb8", "white": "10 W/m2/sr"}
+_LINEAR: dict[str, Any] = {"kind": "linear", "white": "10 W/m2/sr", "bits": 8}
+#: worlds beside the effects: what is true, and what is told in its place
+MORE: dict[str, tuple[dict[str, Any], dict[str, Any]]] = {
+    "half angle": ({}, {"scene.beam.half_angle": "9.2 deg"}),
+    "half angle, soft": (_SOFT, {"scene.beam": {"kind": "cycles", "half_angle": "9.2 deg"}}),
+    "camera's height": ({}, {"scene.camera.height": "191 mm"}),
+    "ellipsoid": ({"scene.surface": {"semi_axes": [1, 1, 1.05]}}, {"scene.surface": {"semi_axes": [1, 1, 1]}}),
+    "gamma": (_LIT | {"scene.sensor": _GAMMA}, _LIT | {"scene.sensor": _LINEAR}),
+    "gamma, soft": (_LIT | _SOFT | {"scene.sensor": _GAMMA}, _LIT | _SOFT | {"scene.sensor": _LINEAR}),
+    "linear": (_LIT | {"scene.sensor": _LINEAR}, _LIT | {"scene.sensor": _GAMMA}),
+    "linear, soft": (_LIT | _SOFT | {"scene.sensor": _LINEAR}, _LIT | _SOFT | {"scene.sensor": _GAMMA}),
+    "full range": (
+        {"scene.sensor": _RECORDED | {"range": "full"}}, {"scene.sensor": _RECORDED | {"range": "limited"}}
+    ),
+}  # fmt: skip
 #: the light of an effect that the white LED does not show
 LIGHTS = {"tissue": "infrared"}
 TOLD = ("rightly", "wrongly", "wrongly, with its sigma", "nothing")
 #: what localizers may assume of what they are told wrongly, where a sigma exists for it
-SIGMAS = {"aslant": Knowns(camera_tilt_sigma_deg=1.0)}
+SIGMAS = {
+    "aslant": Knowns(camera_tilt_sigma_deg=1.0),
+    "half angle": Knowns(half_angle_sigma_deg=0.2),
+    "half angle, soft": Knowns(half_angle_sigma_deg=0.2),
+    "camera's height": Knowns(camera_height_sigma_mm=1.0),
+    "ellipsoid": Knowns(semi_axes_sigma_mm=0.6),
+}
 COLUMNS = ("effect", "told", "pose", "columns", "error_um", "axis_deg", "chi2", "reason")
 RCM_MM = 0.05
 
@@ -93,26 +126,45 @@ def worlds(columns: int) -> Iterator[World]:
         told = {"rightly": true}
         if name in WRONG:
             told |= {"wrongly": scene(WRONG[name], light), "nothing": scene({}, light)}
-        if name in SIGMAS:
-            told["wrongly, with its sigma"] = told["wrongly"]
-        yield World(name, true, told)
+        yield World(name, true, told | _with_sigma(name, told))
+    for name, (is_so, wrong) in MORE.items():
+        told = {"rightly": scene(is_so, "white"), "wrongly": scene(wrong, "white")}
+        yield World(name, told["rightly"], told | _with_sigma(name, told))
 
 
-def measured(world: World, renderer: Renderer, number: int, columns: int) -> Iterator[dict[str, Any]]:
-    """Rows of one pose."""
+def _with_sigma(effect: str, told: dict[str, Scene]) -> dict[str, Scene]:
+    return {"wrongly, with its sigma": told["wrongly"]} if effect in SIGMAS else {}
+
+
+@dataclass(frozen=True, eq=False)
+class View:
+    """A frame of a world, and how it came about."""
+
+    image: AnyImage
+    pose: Pose
+    off: Array  #: of the RCM as it is told `[3]` [mm]
+
+
+def view_of(world: World, renderer: Renderer, number: int) -> View:
+    """The frame of one pose."""
     rng = np.random.default_rng([number, 12])
     tip = rng.uniform([-1.5, -1.5, 3.0], [1.5, 1.5, 4.3])
     off = RCM_MM * rng.standard_normal(3)
     scene = world.true
     pose = Pose.through(tip, scene.instrument.rcm, scene.sway(float(rng.uniform(0.0, 10.0)), number))
     exposure = Exposure(renderer.background(pose), scene.sensor)
-    image = exposure.frame([renderer.tile(pose, 0, number)], scene.power.value, number)
+    return View(exposure.frame([renderer.tile(pose, 0, number)], scene.power.value, number), pose, off)
+
+
+def answers(world: World, view: View, number: int, columns: int) -> Iterator[dict[str, Any]]:
+    """Rows of one pose."""
+    pose = view.pose
     for told, believed in world.told.items():
-        rcm = tuple(map(float, np.asarray(believed.instrument.rcm) + off))
+        rcm = tuple(map(float, np.asarray(believed.instrument.rcm) + view.off))
         given = believed.model_copy(update={"instrument": believed.instrument.model_copy(update={"rcm": rcm})})
         row = {"effect": world.effect, "told": told, "pose": number, "columns": columns}
         knowns = SIGMAS[world.effect] if told.endswith("sigma") else None
-        found = locate(image, given, "photometric", knowns=knowns)
+        found = locate(view.image, given, "photometric", knowns=knowns)
         if isinstance(found, Localization):
             miss = found.apex_mm - pose.apex
             assert found.covariance is not None
@@ -162,7 +214,7 @@ def main() -> None:
             renderer = Renderer(world.true, samples=16, edge_samples=512) if missing else None
             for number in missing:
                 assert renderer is not None
-                new = list(measured(world, renderer, number, asked.columns))
+                new = list(answers(world, view_of(world, renderer, number), number, asked.columns))
                 writer.writerows(new)
                 stream.flush()
                 rows += new

@@ -51,4 +51,5 @@ def patch_outcome(
     return judged(
         fit.estimate, fit.covariance, start.scene, fit.knowns,
         misfit=fit.misfit, covered=fit.lit_share, settled=fit.settled,
+        suspicions=lambda: fit.suspicions(start.scene),
     )  # fmt: skip

@@ -14,7 +14,7 @@ from conespot.localize.model.estimate import Estimate
 from conespot.localize.model.knowns import Knowns
 from conespot.localize.model.prior import rcm_miss
 from conespot.localize.model.smear import sag_sigma
-from conespot.localize.model.suspicion import WALL
+from conespot.localize.model.suspicion import TRANSFER, UNEVEN, WALL
 from conespot.localize.outcome import COVERED, OUTSIDE, UNCERTAIN, Localization, LocalizationFailure, Outcome
 from conespot.scene.camera import Camera
 from conespot.scene.scene import Scene
@@ -28,6 +28,11 @@ WRONG_WALL = (
     "the patch's outline contradicts the scene's eye: its radius, its surface or where the camera is; "
     "semi_axes_sigma leaves the shape free"
 )
+WRONG_TRANSFER = (
+    "the light across the patch's edge contradicts how the scene's sensor turns light to values: with gamma (srgb8), or"
+    " without (linear, emva)"
+)
+_WRONG = {WALL: WRONG_WALL, "eye_radius": WRONG_WALL, TRANSFER: WRONG_TRANSFER}
 UNSETTLED = "the fit does not settle"
 
 
@@ -49,6 +54,9 @@ class VerdictSettings:
     #: three hard spotlights, under the mean eye's for those of 16 others 5.6 to 15 where the axis does not miss the
     #: RCM before (`campaign run eyes --poses 3`)
     suspicious_wall: float = 5.0
+    #: the same of a blur that varies around the outline: under right worlds at most 3.6, under a depth of field nobody
+    #: tells of 4.8 to 8.7 (`benchmarks/told_worlds.py`)
+    suspicious_blur: float = 5.0
     #: by how many of its sigmas a core may be wider than the scene says, in squared diameters. Eleven frames of 9,883
     #: found one that nobody told of, of 0.32 to 0.33 mm: an optic disc for a hard patch beyond the frame, 2.6 mm off
     core_sigmas: float = 6.0
@@ -111,13 +119,11 @@ def judged(
         return LocalizationFailure(MISFIT)
     if _too_wide(estimate.scene, nominal, knowns):
         return LocalizationFailure(WRONG_BEAM)
-    found = {
-        name: abs(score) / (VERDICT.suspicious_wall if name == WALL else VERDICT.suspicious)
-        for name, score in suspicions().items()
-    }
+    limits = {WALL: VERDICT.suspicious_wall, UNEVEN: VERDICT.suspicious_blur}
+    found = {name: abs(score) / limits.get(name, VERDICT.suspicious) for name, score in suspicions().items()}
     worst = max(found, key=lambda name: found[name], default=None)
     if worst is not None and found[worst] > 1.0:
-        return LocalizationFailure(WRONG_WALL if worst in (WALL, "eye_radius") else WRONG_BEAM)
+        return LocalizationFailure(_WRONG.get(worst, WRONG_BEAM))
     if not settled:
         return LocalizationFailure(UNSETTLED)
     distance = distance_of(estimate, joint, knowns, joint=True)

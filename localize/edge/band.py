@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 from conespot.localize.edge.nuisances import Nuisances, first_gain, gain_over
 from conespot.localize.edge.ribbon import Ribbon
 from conespot.localize.edge.sandwich import EdgeFit
+from conespot.localize.edge.seen import Seen
 from conespot.localize.edge.settings import EDGE
 from conespot.localize.edge.strips import Eliminated, score_covariance
 from conespot.localize.edge.surroundings import surroundings
@@ -30,40 +31,16 @@ from conespot.localize.model.irradiance import Irradiance, Lights
 from conespot.localize.model.knowns import Knowns
 from conespot.localize.model.noise import NoiseModel
 from conespot.localize.model.prior import prior_rows
-from conespot.localize.model.sight import Sight, look
+from conespot.localize.model.quantity import quantity
+from conespot.localize.model.sight import look
 from conespot.localize.model.solve import limited, reduction, solved
+from conespot.localize.model.suspicion import matter, watched
 from conespot.localize.model.suspicion import scores as score_tests
-from conespot.localize.model.suspicion import watched
 from conespot.localize.outcome import COVERED, UNCERTAIN, LocalizationFailure
-from conespot.scene.beam import CyclesBeam, HardBeam
 from conespot.scene.scene import Scene
 
 Array = NDArray[np.float64]
-
-
-@dataclass(frozen=True, eq=False)
-class Seen:
-    """What a band's bins of `side` px at `pixels` `[N, 2]` see, and the ambient `irradiance` there `[N]`."""
-
-    sight: Sight
-    pixels: Array
-    side: int
-    irradiance: Array
-
-    def lights(self, estimate: Estimate, knowns: Knowns) -> Lights:
-        """The spotlights' irradiance, with derivatives by what is free."""
-        every = np.ones(len(self.pixels), bool)
-        return Irradiance(self.sight, self.pixels, self.side, estimate, knowns, every)(estimate)
-
-    def softer(self, estimate: Estimate, hard: Array) -> Array | None:
-        """How the irradiance `hard` `[N]` changes as the edge gets soft; None of others, which have a softness."""
-        beam = estimate.scene.beam
-        if not isinstance(beam, HardBeam):
-            return None
-        soft = CyclesBeam(half_angle=beam.half_angle, blend=EDGE.softer)
-        there = Estimate(estimate.pose, estimate.scene.model_copy(update={"beam": soft}))
-        softened = self.lights(there, Knowns().within(there.scene))[0][0]
-        return np.asarray((softened - hard) / EDGE.softer)
+BLUR = quantity("blur")
 
 
 @dataclass(frozen=True)
@@ -124,26 +101,57 @@ class BandFit(EdgeFit):
         """Scores of beam and wall where the fit stands, over their sigmas."""
         knowns, pose_size = self.knowns, self.estimate.pose_size
         wide = watched(knowns, self.estimate.scene)
-        lights, size = self.seen.lights(self.estimate, wide), len(self.information)
-        fixed = [q for q in wide.free if knowns.sigma(q) == 0.0]
-        own = [pose_size + i for i, q in enumerate(wide.free) if q not in fixed]
-        last = [pose_size + i for i, q in enumerate(wide.free) if q in fixed]
-        order, names = [*range(pose_size), *own, *last], [q.name for q in fixed]
-        softer = self.seen.softer(self.estimate, lights[0][0])
+        blurred = wide if wide.sigma(BLUR) != 0.0 else replace(wide, blur_sigma_mm=None)
+        lights = self.seen.lights(self.estimate, blurred)
+        at = {q.name: pose_size + i for i, q in enumerate(blurred.free)}
+        own = [*range(pose_size), *(at[q.name] for q in knowns.free)]
+        told = [q.name for q in wide.free if knowns.sigma(q) == 0.0]
+        softer = self.seen.softer(self.estimate)
+        by_told = [[rows[[at[name] for name in told]]] for _, rows in lights.each]
         if softer is not None:
-            names.append("edge")
-        also = [] if softer is None else [softer[None]]
-        wider = Lights(tuple((light, np.concatenate([rows[order], *also])) for light, rows in lights.each), lights.odds)
+            told.append("edge")
+            by_told = [[*rows, softer[None]] for rows in by_told]
+        by_blur = [rows[at["blur"]] for _, rows in lights.each]
+        others, by_others = self.seen.doubts(self.channels, lights, by_blur, nominal.sensor)
+        each = [
+            (light, np.concatenate([rows[own], *by_told[min(c, len(by_told) - 1)], by_others[c]]))
+            for c, (light, rows) in enumerate(lights[c] for c in range(len(self.channels)))
+        ]
         channels = [copy(channel) for channel in self.channels]
-        told, prior = prior_rows(self.estimate, nominal, knowns)
-        prior = np.pad(prior, ((0, 0), (0, len(names))))
+        pull, prior = prior_rows(self.estimate, nominal, knowns)
+        prior = np.pad(prior, ((0, 0), (0, len(told) + len(others))))
         # where a prior pulls, the slope of what bins say is not zero at the minimum: both together are
-        information, gradient, _ = _equations(channels, self.seen.irradiance, wider, (told, prior))
-        scores, parts, known = self._strips(channels, prior)
+        information, gradient, _ = _equations(
+            channels, self.seen.irradiance, Lights(tuple(each), lights.odds), (pull, prior)
+        )
+        size = len(own)
+        first, last = np.arange(size + len(told)), np.r_[:size, size + len(told) : len(gradient)]
+        found = self._scores(told, channels, prior, gradient, information, first)
+        # they take their time, and hardly ever matter
+        if not matter(others, gradient[last], information[np.ix_(last, last)], size):
+            return found
+        return found | self._scores(others, channels, prior, gradient, information, last)
+
+    def _scores(
+        self,
+        names: list[str],
+        channels: Sequence[Nuisances],
+        prior: Array,
+        gradient: Array,
+        information: Array,
+        of: NDArray[np.intp],
+    ) -> dict[str, float]:
+        """Scores of the last of some shared parameters `of` all, which have those `names`."""
+        own = np.arange(len(gradient), len(channels[0].jacobian))
+        kept = []
+        for channel in channels:
+            kept.append(copy(channel))
+            kept[-1].jacobian = channel.jacobian[[*of, *own]]
+        scores, parts, known = self._strips(kept, prior[:, of])
         follows = float(np.mean([channel.follows for channel in channels]))
         return score_tests(
-            names, gradient / follows, information,
-            score_covariance(self.channels[0].strips, scores, parts) + known, size,
+            names, gradient[of] / follows, information[np.ix_(of, of)],
+            score_covariance(self.channels[0].strips, scores, parts) + known, len(self.information),
         )  # fmt: skip
 
     @staticmethod

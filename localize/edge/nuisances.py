@@ -60,7 +60,7 @@ class Nuisances:
         if math.isnan(self.level):
             self._begin(brightness)
         albedo = self.level + self.slow @ self.strips.slow + self.strips.log_albedo(self.levels)
-        model = np.exp(albedo) * brightness
+        self.model = model = np.exp(albedo) * brightness
         residual, bound = log_residuals(shown, model)
         use = shown.usable | bound
         variance = self.noise.variance(model) / self.pixels / np.square(np.maximum(model, 1e-9))

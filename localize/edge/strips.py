@@ -75,6 +75,11 @@ class Strips:
             waves[5 * number : 5 * number + 5, turn] = _harmonics(turn.stop - turn.start)
         return waves
 
+    @property
+    def around(self) -> Array:
+        """The same, of all outlines alike `[5, S]`."""
+        return np.asarray(self.waves.reshape(len(self.turns), 5, -1).sum(axis=0))
+
     def slow_gradient(self, levels: Array) -> float:
         """Rms by which levels `[S]` of width `WIDTH` change slowly along the outlines, of one wave [1/bin]."""
         found = []

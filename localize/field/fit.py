@@ -23,6 +23,8 @@ from conespot.localize.model.knowns import Knowns
 from conespot.localize.model.noise import NoiseModel
 from conespot.localize.model.prior import prior_rows
 from conespot.localize.model.solve import STEP, inverse, limited
+from conespot.localize.model.suspicion import TRANSFER, matter, scores
+from conespot.localize.model.transfer import mistake
 from conespot.localize.model.view import Bins, Shown, Window, log_albedo, visible
 from conespot.localize.outcome import COVERED, UNCERTAIN, LocalizationFailure
 from conespot.scene.scene import Scene
@@ -54,6 +56,26 @@ class FieldFit:
         meat = sum((piece.scatter(self.step, bread) for piece in self.pieces), np.zeros_like(bread))
         meat[:size, :size] += self.prior
         return np.asarray((bread @ meat @ bread)[:size, :size])
+
+    def suspicions(self, nominal: Scene) -> dict[str, float]:
+        """The score of how values were decoded, where the fit stands, over its sigma: see `model.suspicion`."""
+        size, transfer = len(self.normal), mistake(nominal.sensor)
+        if transfer is None:
+            return {}
+        told, rows = prior_rows(self.estimate, nominal, self.knowns)
+        gradient, information = np.zeros(size + 1), np.zeros((size + 1, size + 1))
+        information[: size - 1, : size - 1], gradient[: size - 1] = rows.T @ rows, -rows.T @ told
+        meat = information.copy()
+        pieces = [copy(piece) for piece in self.pieces]
+        for piece in pieces:
+            light = piece.bins.spotlight(self.estimate)[self.lead]
+            part, slope = piece.linearize(*light, self.gain, transfer)
+            information, gradient = information + part, gradient + slope
+        if not matter([TRANSFER], gradient, information, size):
+            return {}
+        bread, still = inverse(information), np.zeros(size + 1)
+        meat = sum((piece.scatter(still, bread) for piece in pieces), meat)
+        return scores([TRANSFER], gradient, information, meat, size)
 
 
 def fit_patch(

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import cv2
 import numpy as np
 from numpy.typing import NDArray
@@ -98,10 +100,13 @@ class Piece:
         lit = self._lit & self._seen
         return float(np.count_nonzero(self._usable & lit)) / max(1.0, float(np.count_nonzero(lit)))
 
-    def linearize(self, light: Array, rows: Array, log_gain: float) -> tuple[Array, Array]:
+    def linearize(
+        self, light: Array, rows: Array, log_gain: float, also: Callable[[Array], Array] | None = None
+    ) -> tuple[Array, Array]:
         """Information `[P + 1, P + 1]` and gradient `[P + 1]` of the pose and the log gain.
 
-        The lit bins get `light` `[N]`, with its derivatives `[P, N]`.
+        The lit bins get `light` `[N]`, with its derivatives `[P, N]`. `also` makes a row `[h, w]` more, behind the
+        gain's, of the log light by a quantity, out of the model's [white].
         """
         plane, bins = self._plane, self.bins
         shape, gain = plane.signal.shape, np.exp(log_gain)
@@ -118,11 +123,13 @@ class Piece:
             inner = self._usable & (full > FIELD.lit * light.max(initial=0.0))
             self.roughness, local = self.roughness.measured(residual, sensor, use, inner)
         self.misfit = rms((residual / np.sqrt(sensor + local))[use])
-        size = len(rows) + 1
+        size = len(rows) + (1 if also is None else 2)
         jacobian = np.zeros((size + len(self._chroma), full.size))
         share = gain / brightness.ravel()[bins.lit]
-        jacobian[: size - 1, bins.lit] = share * rows
-        jacobian[size - 1, bins.lit] = share * light
+        jacobian[: len(rows), bins.lit] = share * rows
+        jacobian[len(rows), bins.lit] = share * light
+        if also is not None:
+            jacobian[size - 1] = also(model).ravel()
         jacobian[size:] = self._chroma.reshape(len(self._chroma), full.size)
         weights = use / (sensor + self.roughness.variance(local))
         solved = eliminate(self._basis, weights, jacobian.reshape(-1, *shape), residual + self._albedo, self.amplitudes)

@@ -25,12 +25,22 @@ _LEFT = 1e-9
 #: the name of the score of the retina's semi-axes, which are doubted together
 WALL = "wall"
 _SHAPE = ("retina_width", "retina_height", "retina_length")
+#: the names of the scores of a blur that varies around an outline, of four waves together, and of the transfer
+UNEVEN, TRANSFER = "uneven", "transfer"
 #: what each would have to be off by to count, and could be at most [rad, 1, mm, 1]. Nobody knows a lamp's softness to a
 #: hundredth; what would have to be off by more than is possible hardly shows in the frame, and something else is amiss,
 #: such as the foot of a soft edge below the sensor's last level
-_MATERIAL = {"half_angle": (2e-4, 0.05), "softness": (0.01, 1.0), "eye_radius": (0.02, 3.0), "edge": (0.01, 1.0)}
+_MATERIAL = {
+    "half_angle": (2e-4, 0.05),
+    "softness": (0.01, 1.0),
+    "eye_radius": (0.02, 3.0),
+    "edge": (0.01, 1.0),
+    TRANSFER: (0.5, 5.0),  # of the mistake
+}
 #: the same of the wall's shape: least change of all semi-axes together [mm], and most sigmas of a population's
 _SHAPE_MATERIAL_MM, _SHAPE_SIGMAS = 0.02, 5.0
+#: least width of what a blur varies by [mm]
+_UNEVEN_MATERIAL_MM = 1.5e-3
 
 
 def watched(knowns: Knowns, scene: Scene) -> Knowns:
@@ -49,29 +59,72 @@ def watched(knowns: Knowns, scene: Scene) -> Knowns:
     return replace(wide, semi_axes_sigma_mm=knowns.semi_axes_sigma_mm or None)
 
 
+def matter(names: list[str], gradient: Array, information: Array, size: int) -> bool:
+    """Whether any of the last parameters would be off by as much as counts, of blur and transfer, as `scores` has them.
+
+    Without the scatter of the gradient, which takes longer than all else.
+    """
+    left, score, whole = _left(gradient, information, size)
+    waves = [j for j, name in enumerate(names) if name == UNEVEN]
+    if waves and _varies(score[waves], left[np.ix_(waves, waves)], whole[waves]):
+        return True
+    return any(_is_material(names[j], score[j], left[j, j], whole[j]) for j in range(len(names)) if j not in waves)
+
+
 def scores(names: list[str], gradient: Array, information: Array, scatter: Array, size: int) -> dict[str, float]:
     """Each of the last parameters' scores over its own sigma, the first `size` taken out; of those that matter.
 
     `gradient` `[P]`, `information` `[P, P]` and the gradient's covariance `scatter` `[P, P]` are where a fit stands.
-    The semi-axes have one score, of the wall.
+    The semi-axes have one score, of the wall, and a blur's waves have one.
     """
     order = [*range(size, len(gradient)), *range(size)]
     reduced = reduction(information[np.ix_(order, order)], len(gradient) - size)
-    left = reduced @ information[np.ix_(order, order)] @ reduced.T
-    score, variance = reduced @ gradient[order], reduced @ scatter[np.ix_(order, order)] @ reduced.T
-    whole = np.diag(information)[size:]
+    left, score, whole = _left(gradient, information, size)
+    variance = reduced @ scatter[np.ix_(order, order)] @ reduced.T
     found = {}
     for j, name in enumerate(names):
-        s, v, part = float(score[j]), float(variance[j, j]), float(left[j, j])
-        if name in _SHAPE or not (v > 0.0 and part > _LEFT * whole[j]):
+        if name in (*_SHAPE, UNEVEN) or not variance[j, j] > 0.0:
             continue
-        if _MATERIAL[name][0] < abs(s) / part < _MATERIAL[name][1]:
-            found[name] = s / math.sqrt(v)
+        if _is_material(name, score[j], left[j, j], whole[j]):
+            found[name] = float(score[j] / math.sqrt(variance[j, j]))
     shape = [j for j, name in enumerate(names) if name in _SHAPE]
     if shape:
         at = np.ix_(shape, shape)
         found[WALL] = _of_wall(score[shape], left[at], variance[at], whole[shape])
+    waves = [j for j, name in enumerate(names) if name == UNEVEN]
+    if waves:
+        at = np.ix_(waves, waves)
+        found[UNEVEN] = _of_blur(score[waves], left[at], variance[at], whole[waves])
     return found
+
+
+def _left(gradient: Array, information: Array, size: int) -> tuple[Array, Array, Array]:
+    """The last parameters' information and gradient with the first `size` taken out, and their information before."""
+    order = [*range(size, len(gradient)), *range(size)]
+    reduced = reduction(information[np.ix_(order, order)], len(gradient) - size)
+    left = reduced @ information[np.ix_(order, order)] @ reduced.T
+    return left, reduced @ gradient[order], np.diag(information)[size:]
+
+
+def _is_material(name: str, score: float, left: float, whole: float) -> bool:
+    """Whether a quantity would be off by as much as counts, and no more than it can be."""
+    return left > _LEFT * whole and _MATERIAL[name][0] < abs(score) / left < _MATERIAL[name][1]
+
+
+def _varies(score: Array, left: Array, whole: Array) -> bool:
+    """Whether a blur's variance would vary by as much as counts."""
+    step = np.linalg.solve(left + np.diag(_LEFT * whole), score)
+    return float(np.linalg.norm(step)) > _UNEVEN_MATERIAL_MM**2
+
+
+def _of_blur(score: Array, left: Array, variance: Array, whole: Array) -> float:
+    """The score of all waves of a blur's variance together; 0 where they do not matter.
+
+    Of four standard normal quantities the root of the sum of squares: by chance above 5 once in 20,000 frames.
+    """
+    if not _varies(score, left, whole):
+        return 0.0
+    return math.sqrt(max(float(score @ np.linalg.solve(variance + np.diag(_LEFT * whole), score)), 0.0))
 
 
 def _of_wall(score: Array, left: Array, variance: Array, whole: Array) -> float:

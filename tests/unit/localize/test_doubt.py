@@ -15,12 +15,12 @@ from conespot.localize.image import Frame
 from conespot.localize.model.knowns import Knowns
 from conespot.localize.outcome import COMPRESSED, NO_LIGHT
 from conespot.localize.start.search import TWO_PLACES
-from conespot.localize.verdict import WRONG_BEAM, WRONG_WALL
+from conespot.localize.verdict import WRONG_BEAM, WRONG_TRANSFER, WRONG_WALL
 from conespot.scene import InputError
 from conespot.scene.beam import CyclesBeam, HardBeam
 from conespot.scene.eye import Eye
 from conespot.scene.population import SEMI_AXES_SIGMA_MM
-from conespot.scene.sensor import Linear, Recorded
+from conespot.scene.sensor import Linear, Recorded, Srgb8
 from conespot.scene.surface import Surface
 
 SIDE = 400
@@ -142,3 +142,13 @@ def test_no_published_method_answers_on_a_frame_without_light(frames, name):
     dark = np.full((SIDE, SIDE), 47, np.uint8)
     cv2.ellipse(dark, (180, 140), (30, 26), 0.0, 0.0, 360.0, 55, -1)
     assert locate(dark, scene, name).reason == NO_LIGHT
+
+
+def test_linear_values_that_are_told_to_have_gamma_are_refused_for_it():
+    """Soft patches are not always: docs/localizers.md."""
+    scene = scene_of(HardBeam(), resolution=SIDE)
+    image = np.round(photograph(scene, scene.pose(np.array(HERE)), rays=6) / 4095.0 * 255.0).astype(np.uint8)
+    found, told = (locate(image, scene.model_copy(update={"sensor": s}), "photometric") for s in (Linear(), Srgb8()))
+    assert found, found.reason
+    assert not told
+    assert told.reason == WRONG_TRANSFER
