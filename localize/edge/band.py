@@ -104,29 +104,25 @@ class BandFit(EdgeFit):
         blurred = wide if wide.sigma(BLUR) != 0.0 else replace(wide, blur_sigma_mm=None)
         lights = self.seen.lights(self.estimate, blurred)
         at = {q.name: pose_size + i for i, q in enumerate(blurred.free)}
-        own = [*range(pose_size), *(at[q.name] for q in knowns.free)]
         told = [q.name for q in wide.free if knowns.sigma(q) == 0.0]
+        own = [*range(pose_size), *(at[q.name] for q in knowns.free)]
+        first = [*own, *(at[name] for name in told)]
         softer = self.seen.softer(self.estimate)
-        by_told = [[rows[[at[name] for name in told]]] for _, rows in lights.each]
-        if softer is not None:
-            told.append("edge")
-            by_told = [[*rows, softer[None]] for rows in by_told]
+        also = [] if softer is None else [softer[None]]
+        told += ["edge"] * len(also)
         by_blur = [rows[at["blur"]] for _, rows in lights.each]
         others, by_others = self.seen.doubts(self.channels, lights, by_blur, nominal.sensor)
-        each = [
-            (light, np.concatenate([rows[own], *by_told[min(c, len(by_told) - 1)], by_others[c]]))
-            for c, (light, rows) in enumerate(lights[c] for c in range(len(self.channels)))
-        ]
+        shed = [(*lights[c], more) for c, more in enumerate(by_others)]
+        each = tuple((light, np.concatenate([rows[first], *also, more])) for light, rows, more in shed)
         channels = [copy(channel) for channel in self.channels]
         pull, prior = prior_rows(self.estimate, nominal, knowns)
         prior = np.pad(prior, ((0, 0), (0, len(told) + len(others))))
         # where a prior pulls, the slope of what bins say is not zero at the minimum: both together are
-        information, gradient, _ = _equations(
-            channels, self.seen.irradiance, Lights(tuple(each), lights.odds), (pull, prior)
-        )
+        wider = Lights(each, lights.odds)
+        information, gradient, _ = _equations(channels, self.seen.irradiance, wider, (pull, prior))
         size = len(own)
-        first, last = np.arange(size + len(told)), np.r_[:size, size + len(told) : len(gradient)]
-        found = self._scores(told, channels, prior, gradient, information, first)
+        beam, last = np.arange(size + len(told)), np.r_[:size, size + len(told) : len(gradient)]
+        found = self._scores(told, channels, prior, gradient, information, beam)
         # they take their time, and hardly ever matter
         if not matter(others, gradient[last], information[np.ix_(last, last)], size):
             return found
@@ -142,11 +138,10 @@ class BandFit(EdgeFit):
         of: NDArray[np.intp],
     ) -> dict[str, float]:
         """Scores of the last of some shared parameters `of` all, which have those `names`."""
-        own = np.arange(len(gradient), len(channels[0].jacobian))
-        kept = []
-        for channel in channels:
-            kept.append(copy(channel))
-            kept[-1].jacobian = channel.jacobian[[*of, *own]]
+        rows = [*of, *range(len(gradient), len(channels[0].jacobian))]
+        kept = [copy(channel) for channel in channels]
+        for channel in kept:
+            channel.jacobian = channel.jacobian[rows]
         scores, parts, known = self._strips(kept, prior[:, of])
         follows = float(np.mean([channel.follows for channel in channels]))
         return score_tests(
