@@ -107,7 +107,7 @@ class BandFit(EdgeFit):
         told = [q.name for q in wide.free if knowns.sigma(q) == 0.0]
         own = [*range(pose_size), *(at[q.name] for q in knowns.free)]
         first = [*own, *(at[name] for name in told)]
-        softer = self.seen.softer(self.estimate)
+        softer = self.seen.softer(self.estimate, lights[0][0])
         also = [] if softer is None else [softer[None]]
         told += ["edge"] * len(also)
         by_blur = [rows[at["blur"]] for _, rows in lights.each]
