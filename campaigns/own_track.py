@@ -80,7 +80,10 @@ class OwnTrack(OwnFrames):
 
     def _one(self, frame: GivenFrame, tracker: Tracker, alarm: Alarm | None) -> Answer:
         assert frame.time_s is not None
-        self.tracked.append(tracker.track(frame.image, frame.time_s))
+        try:
+            self.tracked.append(tracker.track(frame.image, frame.time_s))
+        except InputError as error:
+            raise InputError(f"{frame.name}: {error}") from None
         return Answer.of(frame, self.tracked[-1].outcome, alarm)
 
     def sentence(self) -> str:

@@ -25,6 +25,9 @@ def write_atomically(path: Path, data: bytes | memoryview, option: str = "--out"
 @contextlib.contextmanager
 def replacing(path: Path, option: str = "--out") -> Iterator[BinaryIO]:
     """A stream whose content stands in `path` once it ends without an error, as `write_atomically` does it."""
+    if path.parent == Path("/dev") or not (path.is_file() or path.is_dir() or not path.exists()):
+        # a file would take a device's place, for everybody
+        raise InputError(f"{path}: cannot be written: is a device or a pipe, no file; choose another {option}")
     temporary = path.with_name(f".{path.name[:100]}.{secrets.token_hex(4)}.tmp")
     try:
         # not tempfile, whose files nobody else may read

@@ -8,8 +8,10 @@ from moving import MovingNeedle
 from conespot.campaigns import own_track
 from conespot.campaigns.command import main
 from conespot.campaigns.own_track import OwnTrack
+from conespot.localize.frames.reader import GivenFrame
 from conespot.localize.outcome import LocalizationFailure
 from conespot.localize.tracking.tracker import State, Tracked
+from conespot.scene import InputError
 from conespot.scene.document import dump
 
 
@@ -59,3 +61,15 @@ def test_frames_without_times_are_refused_with_the_remedy(film, monkeypatch, cap
     monkeypatch.chdir(film)
     assert main(["track", "frames", "--scene", "scene.yaml"]) == 2
     assert "has no time stamp, which tracking needs; give --rate, as '60 Hz'" in capsys.readouterr().err
+
+
+def test_a_frame_that_is_not_later_than_the_one_before_is_named(film, monkeypatch):
+    def reader(*_):
+        for k, time_s in enumerate((0.0, 0.0)):
+            image = cv2.imread(str(film / "frames" / "f0.png"), cv2.IMREAD_UNCHANGED)
+            yield GivenFrame(f"frame {k}", time_s, image)
+
+    monkeypatch.setattr(own_track, "read_frames", reader)
+    own = OwnTrack(str(film / "scene.yaml"), [], "cone", None)
+    with pytest.raises(InputError, match="frame 1: tracking: a frame at 0 s follows one at 0 s; give them in order"):
+        list(own.answers([film], None))

@@ -48,3 +48,10 @@ def test_a_folder_in_the_way_is_one_clear_sentence_and_no_litter(tmp_path):
     with pytest.raises(InputError, match="cannot be written"):
         write_atomically(tmp_path / "table.csv", b"new")
     assert os.listdir(tmp_path) == ["table.csv"]
+
+
+def test_a_pipe_in_the_way_is_one_clear_sentence_and_stays_one(tmp_path):
+    os.mkfifo(tmp_path / "pipe")
+    with pytest.raises(InputError, match="is a device or a pipe, no file; choose another --csv"):
+        write_atomically(tmp_path / "pipe", b"new", "--csv")
+    assert (tmp_path / "pipe").is_fifo()
