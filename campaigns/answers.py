@@ -6,6 +6,7 @@ import csv
 import io
 import json
 import math
+import os
 import re
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -16,7 +17,7 @@ from conespot.localize.distance import Alarm
 from conespot.localize.frames.reader import GivenFrame
 from conespot.localize.outcome import Localization, Outcome
 from conespot.results.columns import TIP_SIGMA
-from conespot.scene.atomic import write_atomically
+from conespot.scene.atomic import can_hold, write_atomically
 from conespot.scene.document import InputError, dump
 from conespot.scene.scene import Scene
 
@@ -46,13 +47,6 @@ class Output(Protocol):
 
     def close(self) -> None:
         """Write what has been taken, as a whole or not at all. Raises InputError if that cannot be done."""
-
-
-def can_hold(path: Path, option: str) -> None:
-    """Raises InputError for a file that could not be written later, before any work is done."""
-    if path.is_dir() or not path.parent.is_dir():
-        why = "is a folder" if path.is_dir() else "its folder does not exist"
-        raise InputError(f"{path}: cannot be written: {why}; choose another {option}")
 
 
 class CsvOutput:
@@ -193,10 +187,12 @@ class OverlayOutput:
     """A picture of every frame with what was seen in it."""
 
     def __init__(self, folder: Path, scene: Scene, localizer: str) -> None:
-        try:
-            folder.mkdir(parents=True, exist_ok=True)
-        except OSError as error:
-            raise InputError(f"{folder}: cannot be made: {error.strerror}; choose another --overlay") from None
+        nearest = folder
+        while not os.path.lexists(nearest) and nearest != nearest.parent:
+            nearest = nearest.parent
+        if not nearest.is_dir():
+            raise InputError(f"{folder}: cannot be made: {nearest} is no folder; choose another --overlay")
+        can_hold(nearest / "f.png", "--overlay")  # it is made with the first picture
         self._folder, self._scene, self._localizer = folder, scene, localizer
         self._taken: set[str] = set()
 
@@ -204,6 +200,13 @@ class OverlayOutput:
         """Draw one, at once: a video's would not fit into memory."""
         from conespot.campaigns.picture import draw_answer
 
+        if not self._taken:
+            try:
+                self._folder.mkdir(parents=True, exist_ok=True)
+            except OSError as error:
+                raise InputError(
+                    f"{self._folder}: cannot be made: {error.strerror}; choose another --overlay"
+                ) from None
         stem = re.sub(r"[^A-Za-z0-9.+_-]+", "-", Path(answer.frame.name).name)[-120:]
         name = stem
         while name in self._taken:  # frames of one name in two folders

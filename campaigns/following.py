@@ -22,10 +22,10 @@ def track(options: argparse.Namespace) -> Ending:
     own = OwnTrack(options.scene, options.set, options.localizer, rate, live=options.live, smooth=options.smooth)
     count = Count()
     alarm = make_alarm(options.alarm, options.false_safe, own.scene)
+    beside = outputs(own, alarm, options)
     if options.reference:
         own.learn(options.reference)
-    files = {name: getattr(options, name) for name in ("csv", "json", "overlay", "tum", "mcap")}
-    for line in localize(own, options.frames, alarm, outputs(own, alarm, **files), count):
+    for line in localize(own, options.frames, alarm, beside, count):
         streams.say(line)
     streams.say(own.sentence())
     if count.sentence:

@@ -9,7 +9,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from pathlib import Path
 
-from conespot.campaigns.answers import can_hold
+from conespot.campaigns.destinations import check_destinations
 from conespot.campaigns.knowledge import Knowledge
 from conespot.campaigns.own_scene import described_scene
 from conespot.localize.blur import SharedBlur, shared_blur
@@ -19,7 +19,7 @@ from conespot.localize.frames.reader import read_frames
 from conespot.localize.model.deep import Deep
 from conespot.localize.settled_fits import Begun
 from conespot.scene import InputError, Scene
-from conespot.scene.atomic import write_atomically
+from conespot.scene.atomic import can_hold, write_atomically
 from conespot.scene.document import Document, dump, find_document, read_value
 from conespot.scene.identity import essence
 from conespot.scene.population import SEMI_AXES_SIGMA_MM
@@ -56,10 +56,11 @@ def calibrate_own(
     too. Raises InputError for a scene or frames
     that cannot be used, fewer than three frames in which the patch can be measured, and a file that cannot be written.
     """
-    can_hold(out, "--out")
     given = find_document(name, "scene", "presets", "scene preset")
     if out.exists() and os.path.samefile(out, given):
-        raise InputError(f"{out}: is the scene that is calibrated; choose another --out")
+        raise InputError(f"{out}: is the scene that is calibrated (--scene); choose another --out")
+    check_destinations({"--out": out}, {"FRAMES": sources}, (name, settings))
+    can_hold(out, "--out")
     scene, knowledge = described_scene(name, settings, "calibrate")
     width = Width()
     if shape:

@@ -2,16 +2,19 @@
 
 from __future__ import annotations
 
+import argparse
 from collections import Counter
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 from conespot.campaigns.answers import Answer, CsvOutput, JsonOutput, Output, OverlayOutput, Table
+from conespot.campaigns.destinations import check_destinations
 from conespot.campaigns.own_scene import described_scene
 from conespot.campaigns.trajectory_outputs import McapOutput, TumOutput
 from conespot.localize.distance import Alarm
 from conespot.localize.frames.reader import GivenFrame, read_frames
+from conespot.localize.frames.stamp import nanoseconds, seconds
 from conespot.localize.image import Reference
 from conespot.localize.locate import LOCALIZERS, find_localizer, locate
 from conespot.localize.model.knowns import Knowns
@@ -78,9 +81,13 @@ def make_rate(text: str | None) -> float | None:
 
 
 def timed(frames: Iterator[GivenFrame], rate_hz: float | None) -> Iterator[GivenFrame]:
-    """The frames, with the time stamps [s] of a rate in place of none or of their own; as they are without one."""
+    """The frames, with the time stamps [s] of a rate in place of none or of their own, or their own without one.
+
+    They are whole nanoseconds, which is all that an MCAP keeps: its replay is of the same times.
+    """
     for number, frame in enumerate(frames):
-        yield frame if rate_hz is None else replace(frame, time_s=number / rate_hz)
+        time = frame.time_s if rate_hz is None else number / rate_hz
+        yield frame if time is None else replace(frame, time_s=seconds(nanoseconds(time)))
 
 
 def make_alarm(distance: str | None, false_safe: float, scene: Scene) -> Alarm | None:
@@ -105,17 +112,12 @@ def noiseless(scene: Scene) -> str:
     )
 
 
-def outputs(
-    own: OwnFrames,
-    alarm: Alarm | None,
-    *,
-    csv: Path | None,
-    json: Path | None,
-    overlay: Path | None,
-    tum: Path | None = None,
-    mcap: Path | None = None,
-) -> list[Output]:
-    """What the options ask for beside the table. Raises InputError for what could not be written."""
+def outputs(own: OwnFrames, alarm: Alarm | None, options: argparse.Namespace) -> list[Output]:
+    """What the options ask for beside the table. Raises InputError for what could not be written, or is read."""
+    csv, json, tum, mcap, overlay = (getattr(options, name) for name in ("csv", "json", "tum", "mcap", "overlay"))
+    read = {"FRAMES": options.frames, "--reference": options.reference or []}
+    files = {"--csv": csv, "--json": json, "--tum": tum, "--mcap": mcap}
+    check_destinations(files, read, (options.scene, options.set), overlay)
     found: list[Output] = []
     if csv is not None:
         found.append(CsvOutput(csv))

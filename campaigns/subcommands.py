@@ -174,10 +174,9 @@ def localize(options: argparse.Namespace) -> Ending:
 
     own, count = OwnFrames(options.scene, options.set, options.localizer, make_rate(options.rate)), Count()
     alarm = make_alarm(options.alarm, options.false_safe, own.scene)
+    beside = outputs(own, alarm, options)
     if options.reference:
         own.learn(options.reference)
-    files = {name: getattr(options, name) for name in ("csv", "json", "overlay", "tum", "mcap")}
-    beside = outputs(own, alarm, **files)
     for line in localize(own, options.frames, alarm, beside, count):
         _say(line)
     return _fail(count.sentence, Ending.FAILED) if count.sentence else Ending.DONE

@@ -11,19 +11,19 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from conespot.campaigns.answers import Answer, can_hold
+from conespot.campaigns.answers import Answer
 from conespot.campaigns.ros_messages import definition
+from conespot.localize.frames.stamp import NANO, nanoseconds
 from conespot.localize.orientation import METRES, camera_rotation, needle_rotation, pose_covariance, quaternion
 from conespot.localize.outcome import Localization
 from conespot.scene import InputError, Scene
-from conespot.scene.atomic import write_atomically
+from conespot.scene.atomic import can_hold, write_atomically
 
 if TYPE_CHECKING:
     from mcap_ros2.writer import Writer
 
 EYE, CAMERA, NEEDLE = "eye", "camera_optical_frame", "needle_tip"
 POSE, IMAGE, INFO = "/needle/pose", "/camera/image/compressed", "/camera/camera_info"
-_NANO = 10**9
 
 Array = NDArray[np.float64]
 
@@ -71,8 +71,8 @@ class McapOutput:
 
     def add(self, answer: Answer) -> None:
         """Take one. Raises InputError for a frame without a time stamp."""
-        stamp = round(_time(answer, "--mcap") * _NANO)
-        if not 0 <= stamp < 2**31 * _NANO:
+        stamp = nanoseconds(_time(answer, "--mcap"))
+        if not 0 <= stamp < 2**31 * NANO:
             raise InputError(f"{answer.frame.name}: its time stamp is none that ROS can hold")
         if not self._count:
             camera = self._scene.camera
@@ -128,7 +128,7 @@ class _Stamped(TypedDict):
 
 
 def _header(stamp: int, frame: str) -> dict[str, object]:
-    return {"stamp": {"sec": stamp // _NANO, "nanosec": stamp % _NANO}, "frame_id": frame}
+    return {"stamp": {"sec": stamp // NANO, "nanosec": stamp % NANO}, "frame_id": frame}
 
 
 def _transform(stamp: int, child: str, origin_mm: Array, rotation: Array) -> _Stamped:

@@ -43,7 +43,7 @@ def read_frames(sources: Sequence[Path], scene: Scene) -> Iterator[GivenFrame]:
     for source in sources:
         path = at_home(source)
         if path.is_dir():
-            for inside in _files(path):
+            for inside in files_of(path):
                 yield from _stills(inside, scene)
         elif path.suffix.lower() in SUFFIXES and kind_of(path) is None:
             for number, (time, stored) in enumerate(read_video(path, scene)):
@@ -66,7 +66,8 @@ def _stills(path: Path, scene: Scene) -> Iterator[GivenFrame]:
         yield GivenFrame(name, None, fitted(name, stored, scene))
 
 
-def _files(folder: Path) -> list[Path]:
+def files_of(folder: Path) -> list[Path]:
+    """The frames of a folder, in the order of the numbers in their names. Raises InputError where there is none."""
     try:
         found = [path for path in folder.iterdir() if path.suffix.lower() in STILLS and not path.name.startswith(".")]
     except OSError as error:

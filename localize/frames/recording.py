@@ -7,6 +7,7 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import BinaryIO
 
+from conespot.localize.frames.stamp import NANO, seconds
 from conespot.localize.frames.still import most_bytes, still_of
 from conespot.localize.frames.stored import Stored
 from conespot.scene.document import InputError
@@ -47,7 +48,7 @@ def read_recording(path: Path, scene: Scene) -> Iterator[tuple[float, Stored]]:
                     raise InputError(f"{path}: holds images of {topic} and {channel.topic}; record one camera a file")
                 topic = channel.topic
                 stamp = message.header.stamp
-                time = stamp.sec + 1e-9 * stamp.nanosec
+                time = seconds(stamp.sec * NANO + stamp.nanosec)
                 yield time, still_of(f"{path}, {topic} at {time:.6f} s", bytes(message.data), scene)
     except (McapError, OSError, ValueError, EOFError, MemoryError, KeyError, TypeError, IndexError) as error:
         raise InputError(f"{path}: cannot be read as MCAP: {' '.join(str(error).split())[:200]}") from None

@@ -3,6 +3,7 @@
 import csv
 import json
 import math
+from types import SimpleNamespace
 
 import cv2
 import numpy as np
@@ -10,6 +11,7 @@ import pytest
 from photographs import photograph, scene_of
 
 from conespot import load_scene
+from conespot.campaigns import own_frames
 from conespot.campaigns.command import main
 from conespot.scene.beam import HardBeam
 
@@ -181,3 +183,43 @@ def test_where_the_first_frame_does_not_fit_its_sentence_stands_alone(own, tmp_p
     assert said.out == ""
     assert len(said.err.splitlines()) == 1
     assert not (tmp_path / "x.csv").exists()
+
+
+@pytest.mark.parametrize(
+    ("options", "said"),
+    [
+        (["--csv", "f.png"], "f.png: is a frame that FRAMES reads; choose another --csv"),
+        (["--json", "link"], "link: is a frame that FRAMES reads; choose another --json"),
+        (["--mcap", "my.yaml"], "my.yaml: is the scene that --scene reads; choose another --mcap"),
+        (["--tum", "curve.csv"], "curve.csv: is a file that --scene names; choose another --tum"),
+        (["--csv", "dark.png", "--reference", "dark.png"], "is a frame that --reference reads; choose another --csv"),
+        (["--csv", "x", "--json", "./x"], "x: is what --csv writes, too; choose another --json"),
+        (["--csv", "o/x.png", "--overlay", "o"], "o/x.png: may be a picture of --overlay, too; choose another --csv"),
+        (["--overlay", "."], ".: holds what FRAMES reads; choose another --overlay"),
+        (["--csv", "/proc/x.csv"], "/proc/x.csv: cannot be written: No such file or directory; choose another --csv"),
+        (["--csv", "/dev/null"], "/dev/null: cannot be written: is a device or a pipe, no file; choose another --csv"),
+        (["--overlay", "my.yaml/seen"], "cannot be made: my.yaml is no folder; choose another --overlay"),
+    ],
+)
+def test_what_is_read_is_never_written_over_and_what_cannot_be_written_is_said_first(
+    own, tmp_path, monkeypatch, capsys, options, said
+):
+    monkeypatch.chdir(tmp_path)
+    for name, source in (("f.png", "frames/frame_0.png"), ("dark.png", "dark.png")):
+        (tmp_path / name).write_bytes((own / source).read_bytes())
+    (tmp_path / "link").symlink_to("f.png")
+    (tmp_path / "curve.csv").write_text("nm,x\n")
+    (tmp_path / "my.yaml").write_text(MY_YAML)
+    named = ["--set", "scene.camera.calibration=curve.csv"] if "curve.csv" in options else []
+    monkeypatch.setattr(own_frames, "OwnFrames", lambda *_: SimpleNamespace(scene=None, localizer="cone"))
+    before = {path: path.read_bytes() for path in tmp_path.iterdir()}
+    assert main(["localize", "f.png", "--scene", "my.yaml", *options, *named]) == 2
+    assert said in capsys.readouterr().err
+    assert {path: path.read_bytes() for path in tmp_path.iterdir()} == before
+
+
+def test_a_calibrated_scene_is_not_written_over_a_frame(own, capsys):
+    frame = own / "frames" / "frame_0.png"
+    command = ["calibrate", own / "frames", "--scene", own / "my.yaml", "--out", frame]
+    assert main([*map(str, command)]) == 2
+    assert "frame_0.png: is a frame that FRAMES reads; choose another --out" in capsys.readouterr().err

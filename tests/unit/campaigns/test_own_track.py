@@ -26,11 +26,15 @@ def film(tmp_path_factory):
     return folder
 
 
-def test_a_replay_writes_the_same_trajectory_again_and_smooths_it(film, tmp_path, capsys, monkeypatch):
+def test_a_replay_of_a_recording_writes_the_same_trajectory_again_and_smoothing_another(
+    film, tmp_path, capsys, monkeypatch
+):
     monkeypatch.chdir(film)
     options = ["track", "frames", "--scene", "scene.yaml", "--rate", "120 Hz"]
-    for name, more in (("a", []), ("b", []), ("s", ["--smooth", "3"])):
+    recording = str(tmp_path / "a.mcap")
+    for name, more in (("a", ["--mcap", recording]), ("s", ["--smooth", "3"])):
         assert main([*options, *more, "--tum", str(tmp_path / name)]) == 0
+    assert main(["track", recording, "--scene", "scene.yaml", "--tum", str(tmp_path / "b")]) == 0
     assert "4 frames: 3 followed, 1 found; " in capsys.readouterr().out
     first, again, smooth = ((tmp_path / name).read_bytes() for name in "abs")
     assert first == again != smooth
