@@ -58,7 +58,10 @@ class OwnFrames:
         """Take frames without spotlights, averaged, as the view of the retina. Raises InputError."""
         if self._knowns is None:
             raise InputError(f"--reference: localizer '{self.localizer}' has no use for it; leave it out")
-        self._reference = Reference.mean((frame.image for frame in read_frames(unlit, self.scene)), self.scene)
+        reference = Reference.mean((frame.image for frame in read_frames(unlit, self.scene)), self.scene)
+        if not reference.pixels.any():
+            raise InputError("--reference: is black everywhere, so it shows nothing of the retina; leave it out")
+        self._reference = reference
 
     def answers(self, sources: Sequence[Path], alarm: Alarm | None) -> Iterator[Answer]:
         """An answer for every frame. Raises InputError where it gets to one that does not fit the scene."""

@@ -92,7 +92,9 @@ def halo(frame: Frame, estimate: Estimate, reference: Reference | None, width: f
     light = frame.light(rows, columns)[0].astype(float).mean(axis=2)
     if reference is not None:
         ground = Frame(reference.pixels, scene.sensor).light(rows, columns)[0].astype(float).mean(axis=2)
-        light = light / np.maximum(ground, 1e-3 * float(np.median(ground)))
+        level = float(np.median(ground))
+        if level > 0.0:  # a black one says nothing
+            light = light / np.maximum(ground, 1e-3 * level)
     y, x = np.mgrid[rows, columns] + 0.5
     shows = scene.camera.shows(np.stack([x.ravel(), y.ravel()], axis=1)).reshape(x.shape)
     factor, sector = np.full(x.shape, np.inf), np.zeros(x.shape, int)

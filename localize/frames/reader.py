@@ -33,7 +33,7 @@ class GivenFrame:
     image: AnyImage
 
 
-def read_frames(sources: Sequence[Path], scene: Scene) -> Iterator[GivenFrame]:
+def read_frames(sources: Sequence[str | Path], scene: Scene) -> Iterator[GivenFrame]:
     """The frames of images, folders of images (in the order of the numbers in their names) and videos, one by one.
 
     Of a TIFF each page is a frame.
@@ -41,7 +41,7 @@ def read_frames(sources: Sequence[Path], scene: Scene) -> Iterator[GivenFrame]:
     that name the key of the scene that would mend it.
     """
     for source in sources:
-        path = at_home(source)
+        path = at_home(Path(source))
         if path.is_dir():
             for inside in files_of(path):
                 yield from _stills(inside, scene)
@@ -60,6 +60,8 @@ def read_frames(sources: Sequence[Path], scene: Scene) -> Iterator[GivenFrame]:
 def _stills(path: Path, scene: Scene) -> Iterator[GivenFrame]:
     kind = kind_of(path)
     if kind is None:
+        if path.stat().st_size == 0:
+            raise InputError(f"{path}: is empty; copy or record it again")
         known = f"PNG, TIFF, JPEG and EXR; videos end in {', '.join(SUFFIXES)}"
         raise InputError(f"{path}: begins like none of the images that are read: {known}")
     for name, stored in read_stills(path, kind, scene):

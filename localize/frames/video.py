@@ -8,18 +8,21 @@ from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 
+from conespot.localize.frames.container import stated_bytes
 from conespot.localize.frames.fit import as_camera
 from conespot.localize.frames.stored import Pixels, Stored, Turn, check_size
 from conespot.scene.document import InputError
 from conespot.scene.scene import Scene
 
 if TYPE_CHECKING:
-    from av import VideoFrame
+    from av import VideoFormat, VideoFrame
 
 #: by which a file is taken for a video
 SUFFIXES = (".mp4", ".m4v", ".mov", ".mkv", ".webm", ".avi", ".mpg", ".mpeg", ".ts", ".mts", ".m2ts", ".y4m", ".mjpg")
 #: containers that hold what they show: none of a list of addresses, which FFmpeg would follow
 _CONTAINERS = "mov,matroska,webm,avi,mpeg,mpegts,yuv4mpegpipe,mjpeg"
+#: bytes of a line of a raw video's text
+_MOST_LINE = 1000
 #: codes that a grey camera's chroma may be off the middle: rounding, and no colour
 _GREY_CODES = 2
 #: FFmpeg's numbers of colour matrices (ITU-T H.273, table 4)
@@ -29,8 +32,8 @@ _MATRICES = {1: "bt709", 5: "bt601", 6: "bt601"}
 def read_video(path: Path, scene: Scene) -> Iterator[tuple[float | None, Stored]]:
     """Frames of the first video stream: time stamp [s], None where the file has none, and picture.
 
-    Raises InputError without PyAV, for what is no video, another size than the camera's, damage, interlacing, and a
-    pixel format that is not read.
+    Raises InputError without PyAV, for what is no video, is cut short by what its container says, another size than
+    the camera's, damage, interlacing, and a pixel format that is not read.
     """
     try:
         import av
@@ -45,6 +48,7 @@ def read_video(path: Path, scene: Scene) -> Iterator[tuple[float | None, Stored]
     }
     av.logging.set_level(None)
     try:
+        _check_whole(path)
         with open(path, "rb") as file, av.open(file, "r", options=limits) as container:
             if not container.streams.video:
                 raise InputError(f"{path}: holds no video stream")
@@ -56,11 +60,40 @@ def read_video(path: Path, scene: Scene) -> Iterator[tuple[float | None, Stored]
             size = (context.height, context.width)
             if size not in (scene.camera.shape, scene.camera.shape[::-1]):  # which turn it has, its frames say
                 check_size(str(path), *size, (Turn.stated(scene.storage),), scene)
+            if container.format.name == "yuv4mpegpipe":
+                _check_raw(path, context.format)
+            number = -1
             for number, frame in enumerate(container.decode(stream)):
                 yield frame.time, _stored(f"{path}, frame {number}", frame, scene)
+            if number < 0:
+                raise InputError(f"{path}: holds no whole frame; copy or record it again")
     except (av.FFmpegError, OSError, ValueError, MemoryError) as error:
         reason = getattr(error, "strerror", None) or " ".join(str(error).split())
         raise InputError(f"{path}: cannot be read as a video: {reason}") from None
+
+
+def _check_whole(path: Path) -> None:
+    """Raise InputError for a file that has fewer bytes than it says."""
+    with open(path, "rb") as file:
+        stated, size = stated_bytes(file), path.stat().st_size
+    if not size:
+        raise InputError(f"{path}: is empty; copy or record it again")
+    if stated is not None and stated > size:
+        raise InputError(
+            f"{path}: is cut short: {size} bytes, where it says that it has at least {stated}; copy or record it again"
+        )
+
+
+def _check_raw(path: Path, pixels: VideoFormat | None) -> None:
+    """Raise InputError for a file of raw frames (YUV4MPEG2) that does not end with a whole one."""
+    if pixels is None:
+        return
+    frame = sum(part.width * part.height * ((part.bits + 7) // 8) for part in pixels.components)
+    with open(path, "rb") as file:
+        head = len(file.readline(_MOST_LINE))
+        each = len(file.readline(_MOST_LINE)) + frame
+    if (path.stat().st_size - head) % each:
+        raise InputError(f"{path}: is cut short: it ends within a frame; copy or record it again")
 
 
 def _stored(name: str, frame: VideoFrame, scene: Scene) -> Stored:

@@ -112,6 +112,12 @@ def test_bad_options_are_one_sentence_before_any_frame_is_looked_at(own, capsys,
     assert len(error.splitlines()) == 1
 
 
+def test_a_black_reference_is_refused_in_a_sentence(own, tmp_path, capsys):
+    cv2.imwrite(str(tmp_path / "black.png"), np.zeros((400, 400), np.uint16))
+    assert localize(own, own / "frames", "--reference", tmp_path / "black.png") == 2
+    assert capsys.readouterr().err.count("--reference: is black everywhere") == 1
+
+
 def test_a_scenes_own_word_on_how_well_it_is_known_is_told_to_the_localizer(own, tmp_path):
     def sigma(*settings):
         localize(own, own / "frames" / "frame_0.png", "--csv", tmp_path / "x.csv", *settings)

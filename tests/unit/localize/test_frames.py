@@ -260,11 +260,15 @@ def test_a_tiff_without_end_and_one_that_holds_more_than_its_pages_are_refused(t
 def test_what_begins_like_no_image_and_what_is_no_file_are_one_sentence(tmp_path):
     (tmp_path / "x.png").write_text("hello")
     (tmp_path / "x.mkv").write_text("hello")
+    (tmp_path / "nothing.png").touch()
+    (tmp_path / "nothing.mkv").touch()
     (tmp_path / "empty").mkdir()
     for name, said in {
         "x.png": "begins like none of the images",
         "x.mkv": "cannot be read as a video",
         "none.png": "cannot be read: No such file",
+        "nothing.png": "is empty; copy",
+        "nothing.mkv": "is empty; copy",
         "empty": "holds no frame",
     }.items():
         with pytest.raises(InputError, match=said):

@@ -14,7 +14,7 @@ from conespot.localize import Knowns, SensorNoise, locate
 from conespot.localize.calibration import NAMES, calibrate
 from conespot.localize.deep_light import SharedDeep, shared_deep
 from conespot.localize.halo import glows
-from conespot.localize.image import Frame
+from conespot.localize.image import Frame, Reference
 from conespot.localize.model.deep import Deep
 from conespot.localize.model.estimate import Estimate
 from conespot.localize.model.forward import light, moved
@@ -219,7 +219,9 @@ def test_a_patch_beside_a_bright_disc_does_not_glow(beam):
     disc = np.linalg.norm(points - scene.outline(pose, 0, 12)[0], axis=1) < 0.8
     signal = (200.0 + 8800.0 * light / light.max()) * np.where(disc, 2.0, 1.0) / 20000.0
     image = np.random.default_rng(1).poisson(4095 * signal).astype(np.uint16).reshape(300, 300)
-    assert not glows(Frame(image, scene.sensor), Estimate(pose, scene), None)
+    black = Reference(np.zeros((300, 300), np.float32))  # says nothing
+    for reference in (None, black):
+        assert not glows(Frame(image, scene.sensor), Estimate(pose, scene), reference)
 
 
 @pytest.mark.slow
