@@ -15,9 +15,11 @@ from conespot.localize.model.estimate import Estimate
 from conespot.localize.model.knowns import Knowns
 from conespot.localize.model.noise import NoiseModel
 from conespot.localize.model.view import outlines
-from conespot.localize.outcome import COMPRESSED, GLOWS, Localization, LocalizationFailure, Outcome
+from conespot.localize.outcome import COMPRESSED, GLOWS, OTHER_LIGHT, Localization, LocalizationFailure, Outcome
 from conespot.localize.spot.start import spot_start
-from conespot.localize.start.search import Start, believed, find_starts
+from conespot.localize.start.rings import Overview, find_rings
+from conespot.localize.start.search import NOTHING, Start, believed, find_starts
+from conespot.localize.start.settings import START
 from conespot.localize.verdict import MISFIT, WRONG_BEAM, WRONG_WALL
 from conespot.scene.pose import Pose
 from conespot.scene.scene import Scene
@@ -28,6 +30,17 @@ Localizes = Callable[[Start, Scene], Outcome]
 
 
 def answered(frame: Frame, scene: Scene, reference: Reference | None, knowns: Knowns, localized: Localizes) -> Outcome:
+    """The one answer of a frame that may be believed, or what speaks against it, in words that say what was seen."""
+    outcome = _believable(frame, scene, reference, knowns, localized)
+    if isinstance(outcome, LocalizationFailure) and outcome.reason == NOTHING:
+        ring = find_rings(Overview.of(frame, reference), scene, 1)[0]
+        return LocalizationFailure(OTHER_LIGHT) if ring.votes > START.round else outcome
+    return outcome
+
+
+def _believable(
+    frame: Frame, scene: Scene, reference: Reference | None, knowns: Knowns, localized: Localizes
+) -> Outcome:
     """The one answer of a frame's starts that may be believed, or what speaks against the frame.
 
     A scene may say nothing of light from under the retina. Where the frame shows some, the scene is taken to have what

@@ -24,6 +24,10 @@ GLOWS: Final = (
     "the patch glows beyond its rim, as light from under the retina does, and does not fit what is usual of that: give "
     "the scene's retina a spread"
 )
+OTHER_LIGHT: Final = (
+    "something bright and round stands out, but has not the outline of the scene's beam: beam.kind is cycles or linear "
+    "where the light fades out softly, hard where it ends sharply"
+)
 #: reasons of the published methods
 NOTHING_FOUND: Final = "nothing found: no patch stands out of the background"
 NO_LIGHT: Final = "no light of a spotlight: nothing is twice as bright as its surroundings"

@@ -228,8 +228,11 @@ def _equations(
 ) -> tuple[Array, Array, Array] | None:
     """Information and covariance `[P + 1, P + 1]` of pose, free quantities and gain, and the step `[P + 1]`.
 
-    `prior` `[P, P]` and its `pull` `[P]` are added to what the pieces say. None if it is singular.
+    `prior` `[P, P]` and its `pull` `[P]` are added to what the pieces say. None if it is singular, or a
+    piece's light has run off to nothing or everything, as it may where a frame is black without noise.
     """
+    if not (np.isfinite(gain) and all(piece.sound for piece in pieces)):
+        return None
     if not all(np.isfinite(light).all() and np.isfinite(rows).all() for light, rows in lights):
         return None
     size = len(pull)

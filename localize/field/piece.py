@@ -95,6 +95,11 @@ class Piece:
         )  # fmt: skip
         self._fresh = False
 
+    @property
+    def sound(self) -> bool:
+        """Whether its albedo is one: it may run off where bins are black without noise."""
+        return bool(np.isfinite(self._albedo).all())
+
     def unclipped(self) -> float:
         """Share of the window's lit bins that can be measured."""
         lit = self._lit & self._seen

@@ -159,6 +159,9 @@ class StartSettings:
     #: what crosses a rim hides it on some rays only: a quarter of them must see more of the beam's edge than of all
     #: else, so more than half
     clear: float = 0.52
+    #: votes with which a refused frame's best ring is said to be something round: frames of noise have 0.14, hard and
+    #: soft patches 0.88 (`pytest tests/unit/localize/test_doubt.py`); it decides on no answer
+    round: float = 0.5
     #: log light that all rays together must see in the mean, and the share of it: the retina's own mottle stays below
     faintest: float = 0.3
     least_share: float = 0.25

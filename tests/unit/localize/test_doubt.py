@@ -13,8 +13,8 @@ from conespot.localize.compression import compressed
 from conespot.localize.doubt import noise_of
 from conespot.localize.image import Frame
 from conespot.localize.model.knowns import Knowns
-from conespot.localize.outcome import COMPRESSED, NO_LIGHT
-from conespot.localize.start.search import TWO_PLACES
+from conespot.localize.outcome import COMPRESSED, NO_LIGHT, OTHER_LIGHT
+from conespot.localize.start.search import NOTHING, TWO_PLACES
 from conespot.localize.verdict import WRONG_BEAM, WRONG_TRANSFER, WRONG_WALL
 from conespot.scene import InputError
 from conespot.scene.beam import CyclesBeam, HardBeam
@@ -152,3 +152,13 @@ def test_linear_values_that_are_told_to_have_gamma_are_refused_for_it():
     assert found, found.reason
     assert not told
     assert told.reason == WRONG_TRANSFER
+
+
+@pytest.mark.parametrize("localizer", ["cone", "photometric"])
+def test_a_soft_patch_told_as_a_hard_one_is_said_to_be_no_hard_one(localizer):
+    tip = (0.6, -0.4, 3.0)
+    told, world = (scene_of(beam, resolution=SIDE) for beam in (HardBeam(), CyclesBeam()))
+    image = photograph(world, world.pose(np.array(tip)), rays=2)
+    assert locate(image, told, localizer).reason == OTHER_LIGHT
+    noise = np.random.default_rng(1).integers(0, 9, (SIDE, SIDE), np.uint16)
+    assert locate(noise, told, localizer).reason == NOTHING
