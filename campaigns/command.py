@@ -51,7 +51,16 @@ def main(arguments: Sequence[str] | None = None) -> int:
 def _options(arguments: Sequence[str] | None) -> argparse.Namespace:
     from conespot.campaigns.command_line import parser
 
-    return parser().parse_args(arguments)
+    line = parser()
+    options, more = line.parse_known_args(arguments)
+    frames = getattr(options, "frames", None)
+    if isinstance(frames, list) and not any(text.startswith("-") for text in more):
+        from pathlib import Path
+
+        frames += map(Path, more)  # those that stand behind an option, which argparse leaves over
+    elif more:
+        line.error(f"unrecognized arguments: {' '.join(more)}")
+    return options
 
 
 def _complain(error: object, code: Ending) -> Ending:

@@ -102,6 +102,12 @@ def _count(text: str) -> int:
     return int(text)
 
 
+def _lag(text: str) -> int:
+    if not (text.isascii() and text.isdecimal() and len(text) < 4 and 1 <= int(text) <= 100):
+        raise argparse.ArgumentTypeError("must be a whole number, 1 to 100")
+    return int(text)
+
+
 def _text(text: str) -> str:
     if not text.strip():
         raise argparse.ArgumentTypeError("is empty, which every reason holds")
@@ -145,7 +151,7 @@ def _add_frames(command: argparse.ArgumentParser) -> None:
     alarm = "say which tips are safe: farther from the wall than this, such as '0.1 mm' (research, no safety device)"
     command.add_argument("--alarm", metavar="DISTANCE", help=alarm)
     chance = "chance that a tip called safe is not, by the stated sigma (default: 0.001)"
-    command.add_argument("--false-safe", type=float, default=1e-3, metavar="P", help=chance)
+    command.add_argument("--false-safe", type=float, metavar="P", help=chance)
 
 
 def _add_own(add: _Add) -> None:
@@ -157,7 +163,7 @@ def _add_own(add: _Add) -> None:
     live = "drop the frames that come while the tracker is busy, as a camera would; else none is dropped"
     track.add_argument("--live", action="store_true", help=live)
     lag = "smooth each pose with as many frames after it (without --overlay and --mcap)"
-    track.add_argument("--smooth", type=int, default=0, metavar="FRAMES", choices=range(1, 101), help=lag)
+    track.add_argument("--smooth", type=_lag, default=0, metavar="FRAMES", help=lag)
     calibrate = add(subcommands.calibrate, "find out of a sequence what it shows of your microscope and the eye")
     calibrate.add_argument("frames", type=Path, nargs="+", metavar="FRAMES", help="images, folders of images, videos")
     calibrate.add_argument("--scene", required=True, help="the YAML file that describes the microscope so far")

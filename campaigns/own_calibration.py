@@ -12,6 +12,7 @@ from pathlib import Path
 from conespot.campaigns.destinations import check_destinations
 from conespot.campaigns.knowledge import Knowledge
 from conespot.campaigns.own_scene import described_scene
+from conespot.campaigns.streams import shown
 from conespot.localize.blur import SharedBlur, shared_blur
 from conespot.localize.calibration import NAMES, QUANTITIES, Calibration, Width, calibrate
 from conespot.localize.deep_light import DEEP, SharedDeep, shared_deep
@@ -81,7 +82,7 @@ def calibrate_own(
     read_scene(Document(str(out), _without_knowledge(text, out), folder=out.parent))  # what is written can be read
     write_atomically(out, text.encode())
     yield from said
-    yield f"{out}: from {found.frames} frames; next: campaign localize FRAMES --scene {out}"
+    yield f"{shown(str(out))}: from {found.frames} frames; next: campaign localize FRAMES --scene {shown(str(out))}"
 
 
 def _said(found: Calibration | SharedDeep) -> Iterator[str]:

@@ -8,8 +8,11 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
-from conespot.campaigns.answers import Answer, CsvOutput, JsonOutput, Output, OverlayOutput, Table
+from conespot.campaigns.answer_row import FLAT, Answer
+from conespot.campaigns.answer_table import Table
+from conespot.campaigns.answers import CsvOutput, JsonOutput, Output, OverlayOutput
 from conespot.campaigns.destinations import check_destinations
+from conespot.campaigns.given_names import GivenNames
 from conespot.campaigns.own_scene import described_scene
 from conespot.campaigns.trajectory_outputs import McapOutput, TumOutput
 from conespot.localize.distance import Alarm
@@ -42,6 +45,9 @@ class OwnFrames:
 
     Raises InputError, before any frame is looked at, for a scene or a localizer that cannot be used.
     """
+
+    #: of a row of an answer
+    columns: tuple[str, ...] = FLAT
 
     def __init__(self, name: str, settings: Sequence[str], localizer: str, rate_hz: float | None = None) -> None:
         self.scene, knowledge = described_scene(name, settings, "localize")
@@ -93,14 +99,20 @@ def timed(frames: Iterator[GivenFrame], rate_hz: float | None) -> Iterator[Given
         yield frame if time is None else replace(frame, time_s=seconds(nanoseconds(time)))
 
 
-def make_alarm(distance: str | None, false_safe: float, scene: Scene) -> Alarm | None:
+#: the chance that a tip called safe is not, where none is asked for
+FALSE_SAFE = 1e-3
+
+
+def make_alarm(distance: str | None, false_safe: float | None, scene: Scene) -> Alarm | None:
     """The alarm of two options; None without one. Raises InputError, also for a scene whose camera has no noise."""
     if distance is None:
+        if false_safe is not None:
+            raise InputError("--false-safe: is the chance of an --alarm; give --alarm DISTANCE, or leave it out")
         return None
     if note := noiseless(scene):
         raise InputError(f"--alarm: {note}")
     try:
-        return Alarm(parse_quantity(distance, "length", bare=False), false_safe)
+        return Alarm(parse_quantity(distance, "length", bare=False), FALSE_SAFE if false_safe is None else false_safe)
     except ValueError as error:
         raise InputError(f"--alarm: {error}") from None
 
@@ -123,7 +135,7 @@ def outputs(own: OwnFrames, alarm: Alarm | None, options: argparse.Namespace) ->
     check_destinations(files, read, (options.scene, options.set), overlay)
     found: list[Output] = []
     if csv is not None:
-        found.append(CsvOutput(csv))
+        found.append(CsvOutput(csv, own.columns))
     if json is not None:
         found.append(JsonOutput(json, own.scene, own.localizer, alarm))
     if tum is not None:
@@ -131,7 +143,7 @@ def outputs(own: OwnFrames, alarm: Alarm | None, options: argparse.Namespace) ->
     if mcap is not None:
         found.append(McapOutput(mcap, own.scene))
     if overlay is not None:
-        found.append(OverlayOutput(overlay, own.scene, own.localizer))
+        found.append(OverlayOutput(overlay, own.scene, own.localizer, GivenNames(options.frames)))
     return found
 
 
@@ -140,19 +152,20 @@ def localize(
 ) -> Iterator[str]:
     """The lines of the table for people, as the frames come; `count` is counted up, and the outputs are written.
 
-    Nothing is said before the first answer: a sentence that refuses the first frame stands alone.
+    Nothing is said before all has been done with the first answer: a sentence that refuses its frame stands alone.
     """
-    table = Table(alarm)
+    table, begun = Table(alarm, GivenNames(sources), states="state" in own.columns), False
     for answer in own.answers(sources, alarm):
-        if not count.frames:
+        for output in beside:
+            output.add(answer)
+        if not begun:
+            begun = True
             if note := noiseless(own.scene):
                 yield f"note: {note}"
             yield from table.head()
-        count.frames += 1
-        if not answer.outcome:
+        count.frames += not answer.dropped
+        if not answer.outcome and not answer.dropped:
             count.refused[str(getattr(answer.outcome, "reason", ""))] += 1
-        for output in beside:
-            output.add(answer)
         yield table.line(answer)
     for output in beside:
         output.close()

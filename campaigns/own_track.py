@@ -9,7 +9,7 @@ from pathlib import Path
 
 import numpy as np
 
-from conespot.campaigns.answers import Answer
+from conespot.campaigns.answer_row import TRACKED, Answer
 from conespot.campaigns.own_frames import OwnFrames, timed
 from conespot.localize.distance import Alarm, with_distance
 from conespot.localize.frames.reader import GivenFrame, read_frames
@@ -25,6 +25,8 @@ class OwnTrack(OwnFrames):
     dropped, as a camera's would be. A replay drops none. With `smooth` frames, each pose is smoothed with as many after
     it, and answers come when all frames have been read.
     """
+
+    columns = (*OwnFrames.columns, *TRACKED)
 
     def __init__(
         self,
@@ -42,7 +44,7 @@ class OwnTrack(OwnFrames):
         self.dropped = 0
 
     def answers(self, sources: Sequence[Path], alarm: Alarm | None) -> Iterator[Answer]:
-        """An answer for every frame that is not dropped. Raises InputError as the reader and the tracker do."""
+        """An answer for every frame, the dropped ones too. Raises InputError as the reader and the tracker do."""
         tracker = Tracker(self.scene, self.localizer, knowns=self._knowns, reference=self._reference)
         kept: list[Answer] = []
         for answer in self._followed(sources, tracker, alarm):
@@ -54,9 +56,13 @@ class OwnTrack(OwnFrames):
         if kept:
             knowns = tracker.knowns
             times, outcomes = [t.time_s for t in self.tracked], [t.outcome for t in self.tracked]
-            found = smoothed(times, outcomes, self.scene, knowns, self._smooth)
-            for answer, outcome in zip(kept, found, strict=True):
-                yield Answer.of(answer.frame, with_distance(outcome, self.scene, knowns), alarm)
+            found = iter(smoothed(times, outcomes, self.scene, knowns, self._smooth))
+            for answer in kept:
+                if answer.dropped:
+                    yield answer
+                    continue
+                outcome = next(found)
+                yield Answer.of(answer.frame, with_distance(outcome, self.scene, knowns), alarm, answer.tracked)
 
     def _followed(self, sources: Sequence[Path], tracker: Tracker, alarm: Alarm | None) -> Iterator[Answer]:
         free_at = -np.inf
@@ -71,6 +77,7 @@ class OwnTrack(OwnFrames):
                     continue
                 if frame.time_s <= free_at:
                     self.dropped += 1
+                    yield Answer.late(before, alarm)
                     continue
                 frame = before
             yield self._one(frame, tracker, alarm)
@@ -84,7 +91,7 @@ class OwnTrack(OwnFrames):
             self.tracked.append(tracker.track(frame.image, frame.time_s))
         except InputError as error:
             raise InputError(f"{frame.name}: {error}") from None
-        return Answer.of(frame, self.tracked[-1].outcome, alarm)
+        return Answer.of(frame, self.tracked[-1].outcome, alarm, self.tracked[-1])
 
     def sentence(self) -> str:
         """How the frames were come by, how long that took, and how many were dropped."""

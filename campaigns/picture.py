@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
-from conespot.campaigns.answers import RESEARCH, Answer
+from conespot.campaigns.answer_row import RESEARCH, Answer
 from conespot.localize.account import account
 from conespot.localize.image import white_level
 from conespot.localize.needle import Needle
@@ -19,8 +19,8 @@ from conespot.scene.scene import Scene
 _SHOWN = 0.004
 
 
-def draw_answer(answer: Answer, scene: Scene, localizer: str, path: Path) -> None:
-    """Write the picture of an answer as PNG. Raises InputError if it cannot be written."""
+def draw_answer(answer: Answer, name: str, scene: Scene, localizer: str, path: Path) -> None:
+    """Write the picture of an answer, on a frame of that name, as PNG. Raises InputError if it cannot be written."""
     image, found = answer.frame.image, answer.outcome
     saw = account(image, scene, localizer, found)
     lines = {"found": saw.found, "fitted": saw.fitted}
@@ -37,7 +37,7 @@ def draw_answer(answer: Answer, scene: Scene, localizer: str, path: Path) -> Non
     safe = {None: "", True: " Safe.", False: " NOT SAFE."}[answer.safe]
     draw_overlay(
         Overlay(image, white, lines, saw.mask, residuals, marks),
-        f"{localizer}, {Path(answer.frame.name).name}: {said}",
+        f"{localizer}, {name}: {said}",
         f"{distance}{safe} {RESEARCH} Residual: over an even retina.",
         path,
     )

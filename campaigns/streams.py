@@ -29,6 +29,21 @@ def make_safe() -> None:
             stream.reconfigure(errors="replace")
 
 
+def shown(text: str) -> str:
+    """A text on one line, with what a terminal obeys and bytes that are no UTF-8 escaped.
+
+    >>> shown("a\\n\\x1b[2J\\udcff")
+    'a\\\\n\\\\x1b[2J\\\\xff'
+    """
+    return "".join(one if one.isprintable() else _escaped(one) for one in text)
+
+
+def _escaped(one: str) -> str:
+    if "\udc80" <= one <= "\udcff":  # how Python keeps a byte of a file's name
+        return f"\\x{ord(one) - 0xDC00:02x}"
+    return one.encode("unicode_escape").decode()
+
+
 class UnheardError(Exception):
     """What was said to stdout cannot be written; the message says why, and is empty where the reader went away."""
 

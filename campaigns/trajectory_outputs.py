@@ -11,7 +11,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from conespot.campaigns.answers import Answer
+from conespot.campaigns.answer_row import Answer
 from conespot.campaigns.ros_messages import definition
 from conespot.localize.frames.stamp import NANO, nanoseconds
 from conespot.localize.orientation import METRES, camera_rotation, needle_rotation, pose_covariance, quaternion
@@ -71,6 +71,8 @@ class McapOutput:
 
     def add(self, answer: Answer) -> None:
         """Take one. Raises InputError for a frame without a time stamp."""
+        if answer.dropped:
+            return
         stamp = nanoseconds(_time(answer, "--mcap"))
         if not 0 <= stamp < 2**31 * NANO:
             raise InputError(f"{answer.frame.name}: its time stamp is none that ROS can hold")

@@ -3,6 +3,7 @@
 import csv
 import json
 import math
+from pathlib import Path
 from types import SimpleNamespace
 
 import cv2
@@ -13,6 +14,7 @@ from photographs import photograph, scene_of
 from conespot import load_scene
 from conespot.campaigns import own_frames
 from conespot.campaigns.command import main
+from conespot.localize.outcome import LocalizationFailure
 from conespot.scene.beam import HardBeam
 
 TIPS = [(0.6, -0.4, 3.0), (-1.2, 0.8, 2.0)]
@@ -217,7 +219,7 @@ def test_what_is_read_is_never_written_over_and_what_cannot_be_written_is_said_f
     (tmp_path / "curve.csv").write_text("nm,x\n")
     (tmp_path / "my.yaml").write_text(MY_YAML)
     named = ["--set", "scene.camera.calibration=curve.csv"] if "curve.csv" in options else []
-    monkeypatch.setattr(own_frames, "OwnFrames", lambda *_: SimpleNamespace(scene=None, localizer="cone"))
+    monkeypatch.setattr(own_frames, "OwnFrames", lambda *_: SimpleNamespace(scene=None, localizer="cone", columns=()))
     before = {path: path.read_bytes() for path in tmp_path.iterdir()}
     assert main(["localize", "f.png", "--scene", "my.yaml", *options, *named]) == 2
     assert said in capsys.readouterr().err
@@ -229,3 +231,41 @@ def test_a_calibrated_scene_is_not_written_over_a_frame(own, capsys):
     command = ["calibrate", own / "frames", "--scene", own / "my.yaml", "--out", frame]
     assert main([*map(str, command)]) == 2
     assert "frame_0.png: is a frame that FRAMES reads; choose another --out" in capsys.readouterr().err
+
+
+def test_names_are_told_apart_and_obeyed_by_no_terminal(own, tmp_path, monkeypatch, capsys):
+    """Frames of one name in two folders, and one whose name has a line's end, an escape and a byte that is no text."""
+    monkeypatch.setattr(own_frames, "locate", lambda *_, **__: LocalizationFailure("too dim"))
+    monkeypatch.chdir(tmp_path)
+    for name in ("d1/f.png", "d2/f.png", "d2/a\n\x1b[2J\udcff$x$.png"):
+        Path(name).parent.mkdir(exist_ok=True)
+        Path(name).write_bytes((own / "dark.png").read_bytes())
+    assert localize(own, "d1", "--csv", "x.csv", "--overlay", "seen", "d2") == 1  # an option between frames, too
+    lines = capsys.readouterr().out.splitlines()
+    assert [line.partition(" ")[0] for line in lines[1:]] == ["d1/f.png", r"a\n\x1b[2J\xff$x$.png", "d2/f.png"]
+    assert sorted(path.name for path in Path("seen").iterdir())[1:] == ["d1-f.png.png", "d2-f.png.png"]
+    assert r"\xff$x$.png" in Path("x.csv").read_text("utf-8")
+
+
+@pytest.mark.parametrize(
+    ("command", "options", "said"),
+    [
+        ("localize", ["--false-safe", "0.01"], "--false-safe: is the chance of an --alarm; give --alarm DISTANCE"),
+        ("track", ["--smooth", "0"], "argument --smooth: must be a whole number, 1 to 100"),
+        ("localize", ["--tum", "x.tum"], "has no time stamp, which --tum needs"),
+        ("localize", ["--typo"], "unrecognized arguments: --typo"),
+    ],
+)
+def test_options_that_cannot_be_are_a_sentence_without_a_table(
+    own, tmp_path, monkeypatch, capsys, command, options, said
+):
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(own_frames, "locate", lambda *_, **__: LocalizationFailure("too dim"))
+    try:
+        code = main([command, str(own / "dark.png"), "--scene", str(own / "my.yaml"), *options])
+    except SystemExit as end:
+        code = end.code
+    heard = capsys.readouterr()
+    assert (code, heard.out) == (2, "")
+    assert said in heard.err
+    assert not list(tmp_path.iterdir())

@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from conespot.campaigns.answers import Answer
+from conespot.campaigns.answer_row import Answer
 from conespot.campaigns.trajectory_outputs import INFO, POSE, McapOutput, TumOutput
 from conespot.localize.frames.reader import GivenFrame, read_frames
 from conespot.localize.orientation import FREE_ROLL, camera_rotation, needle_rotation, pose_covariance, quaternion
