@@ -15,17 +15,19 @@ def init(options: argparse.Namespace) -> Ending:
     from pathlib import Path
 
     from conespot.campaigns import new_campaign, new_microscope
-    from conespot.campaigns.questions import answers, refuse_answers
+    from conespot.campaigns.questions import answers, refuse_answers, say_unasked
 
     if options.microscope:
         refuse_answers(options, new_campaign.QUESTIONS, "campaign; leave --microscope out")
         path = options.file or Path("my_microscope.yaml")
         new_microscope.write_microscope(path, answers(options, new_microscope.QUESTIONS))
+        say_unasked(options, new_microscope.QUESTIONS)
         streams.say(f"{path}: next: campaign localize FRAMES --scene {path}")
         return Ending.DONE
     refuse_answers(options, new_microscope.QUESTIONS, "microscope; add --microscope")
     options.file = options.file or Path("my_campaign.yaml")
     rows = new_campaign.write_campaign(options.file, answers(options, new_campaign.QUESTIONS))
+    say_unasked(options, new_campaign.QUESTIONS)
     streams.say(f"{options.file}: {rows} rows; next: campaign plan {options.file}")
     return Ending.DONE
 

@@ -11,6 +11,8 @@ from conespot.campaigns.questions import Question, write_answered
 
 #: the answer of a question that does not matter here
 NONE = "none"
+#: of a described camera: with the focal length it says which angle a row sees, and nothing else
+_SENSOR_WIDTH_MM = 36.0
 
 
 def _quantity(kind: str, low: float, high: float) -> Callable[[str], str]:
@@ -67,9 +69,14 @@ def _point(text: str) -> str:
     return f"[{', '.join(parts)}]"
 
 
-def _file(text: str) -> str:
-    if text != NONE and not Path(text).is_file():
+def _calibration(text: str) -> str:
+    if text == NONE:
+        return text
+    if not Path(text).is_file():
         raise ValueError(f"{text}: no such file; answer {NONE} if there is none")
+    from conespot.scene.calibration_file import intrinsics
+
+    intrinsics(Path(text), _SENSOR_WIDTH_MM)  # a bad one is refused here, where the option can be named
     return text
 
 
@@ -80,7 +87,9 @@ def _rigs() -> list[str]:
 
 
 QUESTIONS = (
-    Question("calibration", "OpenCV's calibration file of the camera, or none", NONE, metavar="FILE", check=_file),
+    Question(
+        "calibration", "OpenCV's calibration file of the camera, or none", NONE, metavar="FILE", check=_calibration
+    ),
     Question("pixels", "columns and rows of a frame, if there is none", "1920x1080", metavar="CxR", check=_pixels),
     Question(
         "field", "how much of the retina a row of the frame shows", "13.2 mm", metavar="LENGTH",
@@ -169,7 +178,7 @@ def _camera(path: Path, answers: Mapping[str, str]) -> Iterator[str]:
         beside = os.path.relpath(answers["calibration"], path.parent)
         yield f"  calibration: {beside} # resolution, focal length, principal point and distortion"
     else:
-        width = 36.0
+        width = _SENSOR_WIDTH_MM
         focal = format_quantity(float(f"{width * distance / parse_quantity(answers['field'], 'length'):.6g}"), "length")
         yield f"  resolution: {answers['pixels']} # columns and rows [px]"
         yield f"  sensor_width: {width:g} mm # with the focal length it says which angle a row sees, nothing else"

@@ -81,7 +81,7 @@ def answers(options: argparse.Namespace, questions: Iterable[Question]) -> dict[
     from conespot.scene.document import InputError
 
     found: dict[str, str] = {}
-    people = not options.defaults and sys.stdin.isatty() and sys.stderr.isatty()
+    people = _people(options)
     for question in questions:
         given = getattr(options, question.name.replace("-", "_"))
         if given is None and people:
@@ -92,6 +92,21 @@ def answers(options: argparse.Namespace, questions: Iterable[Question]) -> dict[
         except ValueError as error:
             raise InputError(f"--{question.name}: {error}") from None
     return found
+
+
+def say_unasked(options: argparse.Namespace, questions: Iterable[Question]) -> None:
+    """Say on stderr how many questions took their default because nobody could be asked, and nobody said so."""
+    silent = [q for q in questions if getattr(options, q.name.replace("-", "_")) is None]
+    if silent and not options.defaults and not _people(options):
+        streams.complain(
+            f"there is no terminal to ask on, so {len(silent)} questions took their defaults; read the file, or answer"
+            " by options"
+        )
+
+
+def _people(options: argparse.Namespace) -> bool:
+    """Whether somebody can be asked, and wants to be."""
+    return not options.defaults and sys.stdin.isatty() and sys.stderr.isatty()
 
 
 def refuse_answers(options: argparse.Namespace, questions: Iterable[Question], what: str) -> None:

@@ -229,10 +229,8 @@ def _equations(
     """Information and covariance `[P + 1, P + 1]` of pose, free quantities and gain, and the step `[P + 1]`.
 
     `prior` `[P, P]` and its `pull` `[P]` are added to what the pieces say. None if it is singular, or a
-    piece's light has run off to nothing or everything, as it may where a frame is black without noise.
+    piece's model has no light or no end of it, as it may where a frame is black without noise.
     """
-    if not (np.isfinite(gain) and all(piece.sound for piece in pieces)):
-        return None
     if not all(np.isfinite(light).all() and np.isfinite(rows).all() for light, rows in lights):
         return None
     size = len(pull)
@@ -242,6 +240,8 @@ def _equations(
         part, slope = piece.linearize(*light, gain)
         information += part
         gradient += slope
+    if not np.isfinite(information).all():
+        return None
     covariance = inverse(information)
     step = covariance @ gradient
     return (information, covariance, step) if np.all(np.isfinite(step)) else None

@@ -95,11 +95,6 @@ class Piece:
         )  # fmt: skip
         self._fresh = False
 
-    @property
-    def sound(self) -> bool:
-        """Whether its albedo is one: it may run off where bins are black without noise."""
-        return bool(np.isfinite(self._albedo).all())
-
     def unclipped(self) -> float:
         """Share of the window's lit bins that can be measured."""
         lit = self._lit & self._seen
@@ -111,7 +106,7 @@ class Piece:
         """Information `[P + 1, P + 1]` and gradient `[P + 1]` of the pose and the log gain.
 
         The lit bins get `light` `[N]`, with its derivatives `[P, N]`. `also` makes a row `[h, w]` more, behind the
-        gain's, of the log light by a quantity, out of the model's [white].
+        gain's, of the log light by a quantity, out of the model's [white]. Not a number where there is no such model.
         """
         plane, bins = self._plane, self.bins
         shape, gain = plane.signal.shape, np.exp(log_gain)
@@ -119,6 +114,9 @@ class Piece:
         self._lit = full > 0.0
         brightness = incident_light(bins.ambient.reshape(shape), gain * full)
         model = np.exp(plane.template + self._albedo) * brightness
+        size = len(rows) + (1 if also is None else 2)
+        if not np.isfinite(model).all():
+            return np.full((size, size), np.nan), np.full(size, np.nan)
         sensor = self._noise.variance(model) / bins.at.side**2 / np.square(np.maximum(model, 1e-9))
         residual, bound = log_residuals(plane, model, sensor)
         use = self._usable | (bound & self._seen)
@@ -128,7 +126,6 @@ class Piece:
             inner = self._usable & (full > FIELD.lit * light.max(initial=0.0))
             self.roughness, local = self.roughness.measured(residual, sensor, use, inner)
         self.misfit = rms((residual / np.sqrt(sensor + local))[use])
-        size = len(rows) + (1 if also is None else 2)
         jacobian = np.zeros((size + len(self._chroma), full.size))
         share = gain / brightness.ravel()[bins.lit]
         jacobian[: len(rows), bins.lit] = share * rows

@@ -68,6 +68,13 @@ def test_a_calibration_of_opencv_is_taken_as_it_is(tmp_path):
     assert scene.camera.distortion.k1 == -0.1
 
 
+def test_a_bad_calibration_is_named_by_its_option_and_nothing_is_written(tmp_path, capsys):
+    (tmp_path / "rat.yml").write_text("hello")
+    assert main(["init", "--microscope", "x.yaml", "--defaults", "--calibration", "rat.yml"]) == 2
+    assert "campaign: --calibration: rat.yml: is no calibration" in capsys.readouterr().err
+    assert not (tmp_path / "x.yaml").exists()
+
+
 @pytest.mark.parametrize(
     ("options", "said"),
     [
@@ -86,6 +93,13 @@ def test_an_answer_that_is_none_is_one_sentence_and_nothing_is_written(tmp_path,
     assert said in error
     assert len(error.splitlines()) == 1
     assert not list(tmp_path.iterdir())
+
+
+def test_where_nobody_can_be_asked_it_says_that_nothing_was(capsys):
+    written("--field", "8 mm")
+    assert "no terminal to ask on, so 16 questions took their defaults" in capsys.readouterr().err
+    written("--defaults", name="x.yaml")
+    assert not capsys.readouterr().err
 
 
 def test_nothing_is_written_over(tmp_path, capsys):

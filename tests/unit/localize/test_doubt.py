@@ -16,8 +16,9 @@ from conespot.localize.model.knowns import Knowns
 from conespot.localize.outcome import COMPRESSED, NO_LIGHT, OTHER_LIGHT
 from conespot.localize.start.search import NOTHING, TWO_PLACES
 from conespot.localize.verdict import WRONG_BEAM, WRONG_TRANSFER, WRONG_WALL
-from conespot.scene import InputError
+from conespot.scene import InputError, Scene
 from conespot.scene.beam import CyclesBeam, HardBeam
+from conespot.scene.camera import Camera
 from conespot.scene.eye import Eye
 from conespot.scene.population import SEMI_AXES_SIGMA_MM
 from conespot.scene.sensor import Linear, Recorded, Srgb8
@@ -152,6 +153,17 @@ def test_linear_values_that_are_told_to_have_gamma_are_refused_for_it():
     assert found, found.reason
     assert not told
     assert told.reason == WRONG_TRANSFER
+
+
+@pytest.mark.filterwarnings("error::RuntimeWarning")
+@pytest.mark.parametrize("localizer", ["cone", "photometric"])
+def test_a_patch_on_black_without_noise_and_a_black_reference_are_an_outcome_and_no_warning(localizer):
+    scene = Scene(camera=Camera(resolution=200), sensor=Srgb8())
+    y, x = np.mgrid[:200, :200]
+    image = np.where(np.hypot(x - 90, y - 110) < 30, 127, 0).astype(np.uint8)
+    for reference in (None, np.zeros_like(image)):
+        found = locate(image, scene, localizer, reference=reference)
+        assert found or found.reason
 
 
 @pytest.mark.parametrize("localizer", ["cone", "photometric"])
