@@ -19,6 +19,7 @@ from conespot.campaigns.ending import RunError
 from conespot.campaigns.exporter import make_exporter
 from conespot.campaigns.frame_names import FrameNames
 from conespot.campaigns.interruption import interruption
+from conespot.campaigns.plain_file import open_plain
 from conespot.campaigns.plan import Case, Group, Plan, Unit, told
 from conespot.campaigns.pool import LocalPool
 from conespot.campaigns.progress import Progress
@@ -34,6 +35,8 @@ INDEX = "index.csv"
 #: other light moves a tip by more
 _SAME_MM = 1e-6
 _MOST_NAMED = 3
+#: how an index begins
+_BEGINS = b"frame,case,pose,"
 
 
 def export(folder: Path, frames: Path, workers: int) -> Iterator[str]:
@@ -50,8 +53,7 @@ def export(folder: Path, frames: Path, workers: int) -> Iterator[str]:
         finished = [unit for unit in plan.units() if unit.key in store.entries and not store.entries[unit.key].error]
         if not finished:
             raise InputError(f"{folder}: no pose is finished; `campaign run` or `campaign retry` goes on with it")
-        for path in (frames, frames / "images", frames / "scenes"):
-            _make(path)
+        make_export(frames)
         names = FrameNames.begun(folder, plan)
         left = [unit for unit in finished if not _all_there(plan, unit, names, frames)]
         _write(plan, left, names, frames, workers, store)
@@ -63,15 +65,24 @@ def export(folder: Path, frames: Path, workers: int) -> Iterator[str]:
     yield f"score what a method finds in them with: campaign score {folder} ESTIMATES.csv --name NAME"
 
 
-def _make(path: Path) -> None:
+def make_export(frames: Path) -> None:
+    """Make the folder of an export, or find that one is begun there. Raises InputError for one that holds others."""
     try:
-        if path.name not in ("images", "scenes") and path.is_dir():
-            others = {entry.name for entry in path.iterdir()} - {INDEX, "images", "scenes"}
+        if frames.is_dir():
+            others = {entry.name for entry in frames.iterdir()} - {INDEX, "images", "scenes"}
+            if (index := frames / INDEX).exists() and not _is_index(index):
+                others.add(INDEX)
             if others:
-                raise InputError(f"{path}: holds {min(others)!r}, which is no export's; choose another --frames")
-        path.mkdir(parents=True, exist_ok=True)
+                raise InputError(f"{frames}: holds {min(others)!r}, which is no export's; choose another --frames")
+        for path in (frames, frames / "images", frames / "scenes"):
+            path.mkdir(parents=True, exist_ok=True)
     except OSError as error:
-        raise InputError(f"{path}: cannot be made: {error.strerror}; choose another --frames") from None
+        raise InputError(f"{frames}: cannot be made: {error.strerror}; choose another --frames") from None
+
+
+def _is_index(path: Path) -> bool:
+    with open_plain(path) as stream:
+        return stream.readline(len(_BEGINS)) == _BEGINS
 
 
 def _all_there(plan: Plan, unit: Unit, names: FrameNames, frames: Path) -> bool:

@@ -8,7 +8,7 @@ import pandas as pd
 import pytest
 
 from conespot.campaigns.begun import plan_of
-from conespot.campaigns.export import INDEX, _write_index
+from conespot.campaigns.export import INDEX, _write_index, make_export
 from conespot.campaigns.exporter import png
 from conespot.campaigns.frame_names import FILE, FrameNames
 from conespot.campaigns.pack import pack
@@ -179,6 +179,7 @@ def test_an_export_tells_what_localizers_are_told_and_nothing_that_leads_to_the_
     plan, frames = plan_of(run), tmp_path / "frames"
     (frames / "scenes").mkdir(parents=True)
     assert _write_index(plan, list(plan.units())[:2], FrameNames.of(run, plan), frames) == 4
+    make_export(frames)  # goes on with it
     index = pd.read_csv(frames / INDEX)
     assert set(index["frame"]) == {names[case, pose] for case in (1, 2) for pose in (0, 1)}
     # told an RCM of its own at each pose, or the scene's
@@ -193,6 +194,18 @@ def test_an_export_tells_what_localizers_are_told_and_nothing_that_leads_to_the_
         assert group.key not in written
         for number in group.positions.ravel().tolist():
             assert f"{number:.4f}" not in written
+
+
+@pytest.mark.parametrize("folder", ["images", "frames"])
+@pytest.mark.parametrize("name", ["index.csv", "mine.txt"])
+def test_an_export_is_not_written_over_somebodys_own_files(tmp_path, folder, name):
+    own = tmp_path / folder / name
+    own.parent.mkdir()
+    own.write_text("frame,label\n")
+    with pytest.raises(InputError, match=f"holds '{name}', which is no export's; choose another --frames"):
+        make_export(own.parent)
+    assert own.read_text() == "frame,label\n"
+    assert list(own.parent.iterdir()) == [own]
 
 
 def test_pixel_values_go_into_a_png_unchanged_with_nothing_beside_them(tmp_path):
