@@ -76,9 +76,13 @@ def calibrate_own(
     calibrated = calibrated if blur is None else blur.applied(calibrated)
     deep = shared_deep(begun, calibrated)
     said = [*_said(found), *_said_of_blur(blur), *_said_of_deep(deep, calibrated), *found.correlations().splitlines()]
-    said += [f"not asked: {words}" for words in ([] if tilt else [_UNASKED]) + [_NEVER]]
+    known = _known(knowledge, found, deep, width)
+    said += [
+        *_kept(knowledge, known, found),
+        *(f"not asked: {words}" for words in ([] if tilt else [_UNASKED]) + [_NEVER]),
+    ]
     calibrated = calibrated if deep is None else deep.applied(calibrated)
-    text = _file(calibrated, _known(knowledge, found, deep, width), found, said)
+    text = _file(calibrated, known, found, said)
     read_scene(Document(str(out), _without_knowledge(text, out), folder=out.parent))  # what is written can be read
     write_atomically(out, text.encode())
     yield from said
@@ -91,6 +95,19 @@ def _said(found: Calibration | SharedDeep) -> Iterator[str]:
         quantity = line.partition(":")[0]
         remedy = next(said for start, said in _REMEDIES.items() if quantity.startswith(start))
         yield line if found.observable[quantity] else f"{line}; what would show it: {remedy}"
+
+
+def _kept(knowledge: Knowledge, known: dict[str, object], found: Calibration) -> Iterator[str]:
+    """A line a sigma of the scene's file that stays as it was told, since the sequence does not show its quantity."""
+    fields = [_field(quantity.known) for quantity in QUANTITIES] + ["rcm_sigma"] * 3
+    asked = [field in known and sigma > _EXACT_MM for field, sigma in zip(fields, found.sigmas, strict=True)]
+    unseen = [
+        field for field, name, was in zip(fields, NAMES, asked, strict=True) if was and not found.observable[name]
+    ]
+    for field in dict.fromkeys(unseen):
+        line = f"{field} stays {known[field]}, as told"
+        exact = getattr(knowledge, field) == 0.0
+        yield f"{line}: localize takes it as exact; write how well it is known, if it is not" if exact else line
 
 
 def _said_of_deep(deep: SharedDeep | None, scene: Scene) -> Iterator[str]:

@@ -107,6 +107,7 @@ class Calibration:
     covariance: Array  #: `[12, 12]`
     observable: dict[str, bool]
     frames: int  #: that took part
+    priors: Array  #: standard deviations `[12]` with which each was asked, about what was told
 
     @property
     def sigmas(self) -> Array:
@@ -116,13 +117,14 @@ class Calibration:
     def statement(self) -> str:
         """One sentence a quantity: its value and sigma, or that the sequence does not tell."""
         lines = []
-        for name, number, sigma in zip(NAMES, self.values, self.sigmas, strict=True):
+        for name, number, sigma, prior in zip(NAMES, self.values, self.sigmas, self.priors, strict=True):
             if sigma <= _FIXED:
                 continue
             unit, factor = _UNITS.get(name, ("mm", 1.0))
             said = f"{number * factor:.4f} +- {sigma * factor:.4f} {unit}".rstrip()
             seen = self.observable[name]
-            lines.append(f"{name}: {said}" if seen else f"{name}: not observable from this sequence ({said})")
+            asked = f"{said}, asked with +- {prior * factor:g} {unit}".rstrip()
+            lines.append(f"{name}: {said}" if seen else f"{name}: not observable from this sequence ({asked})")
         return "\n".join(lines)
 
     def correlations(self) -> str:
@@ -185,7 +187,7 @@ def calibrate(
         now = _with_values(scene, found, [True] * len(NAMES))
     ratio = widths / np.sqrt(np.diag(covariance))
     observable = {name: bool(r >= CALIBRATION.observable) for name, r in zip(NAMES, ratio, strict=True)}
-    return Calibration(found, covariance, observable, used)
+    return Calibration(found, covariance, observable, used, widths)
 
 
 def _has_softness(scene: Scene) -> bool:

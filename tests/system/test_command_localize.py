@@ -153,6 +153,9 @@ def test_what_a_sequence_does_not_show_stays_as_it_was_and_is_said_with_what_wou
     assert "what would show it: an object of known size" in said
     assert "not asked: camera's tilt: give --tilt to have it asked for" in said
     assert "deep light: the scene has none; to have it asked for, give the scene retina: " in said
+    assert "mm, asked with +- 0.2 mm); what would show it: tips further apart" in said
+    assert "rcm_sigma stays 0.02 mm, as told\n" in said
+    assert "half_angle_sigma stays 0 deg, as told: localize takes it as exact; write how well" in said
     assert found.instrument.rcm[2] == 22.0
     assert found.beam.half_angle == pytest.approx(math.radians(9.0))
     assert found.camera == load_scene(own / "my.yaml").camera.with_columns(300)

@@ -98,5 +98,5 @@ def test_quantities_that_a_sequence_confounds_are_said_and_those_that_it_does_no
     covariance[0, 2] = covariance[2, 0] = -0.9 * 1e-3 * 0.01
     covariance[0, 3] = covariance[3, 0] = 0.8 * 1e-3 * 0.1
     shown = {name: name != "camera_height" for name in NAMES}
-    found = Calibration(np.zeros(12), covariance, shown, 5)
+    found = Calibration(np.zeros(12), covariance, shown, 5, np.ones(12))
     assert found.correlations() == "half_angle and eye_radius: correlation -0.90"
