@@ -111,7 +111,7 @@ class BandFit(EdgeFit):
         also = [] if softer is None else [softer[None]]
         told += ["edge"] * len(also)
         by_blur = [rows[at["blur"]] for _, rows in lights.each]
-        others, by_others = self.seen.doubts(self.channels, lights, by_blur, nominal.sensor)
+        others, by_others = self.seen.doubts(self.channels, lights, by_blur, nominal)
         shed = [(*lights[c], more) for c, more in enumerate(by_others)]
         each = tuple((light, np.concatenate([rows[first], *also, more])) for light, rows, more in shed)
         channels = [copy(channel) for channel in self.channels]

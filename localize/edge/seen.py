@@ -18,7 +18,7 @@ from conespot.localize.model.sight import Sight
 from conespot.localize.model.suspicion import TRANSFER, UNEVEN
 from conespot.localize.model.transfer import mistake
 from conespot.scene.beam import CyclesBeam, HardBeam
-from conespot.scene.sensor import ImageSensor
+from conespot.scene.scene import Scene
 
 Array = NDArray[np.float64]
 
@@ -48,16 +48,18 @@ class Seen:
         return np.asarray((softened - hard) / EDGE.softer)
 
     def doubts(
-        self, channels: Sequence[Nuisances], lights: Lights, by_blur: Sequence[Array], sensor: ImageSensor
+        self, channels: Sequence[Nuisances], lights: Lights, by_blur: Sequence[Array], scene: Scene
     ) -> tuple[list[str], list[Array]]:
         """Names `[D]` and derivatives of the light by what is in no scene, a channel each `[D, N]`.
 
         A blur that varies around the outline by one wave or two, where `by_blur` `[N]` are a channel's derivatives by a
-        blur that does not: a lens out of focus on a slope, a tip that moves. And values that were decoded amiss.
+        blur that does not: a lens out of focus on a slope, a tip that moves. And values that were decoded amiss, of
+        hard edges: what the foot of a soft one lacks below a sensor's last level looks the same.
         """
         strips = channels[0].strips
         waves = strips.around[1:, strips.index]
-        names, each, transfer = [UNEVEN] * len(waves), [], mistake(sensor)
+        names, each = [UNEVEN] * len(waves), []
+        transfer = mistake(scene.sensor) if isinstance(scene.beam, HardBeam) else None
         for c, channel in enumerate(channels):
             rows = [waves * by_blur[min(c, len(by_blur) - 1)]]
             if transfer is not None:

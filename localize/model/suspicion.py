@@ -107,8 +107,14 @@ def _left(gradient: Array, information: Array, size: int) -> tuple[Array, Array,
 
 
 def _is_material(name: str, score: float, left: float, whole: float) -> bool:
-    """Whether a quantity would be off by as much as counts, and no more than it can be."""
-    return left > _LEFT * whole and _MATERIAL[name][0] < abs(score) / left < _MATERIAL[name][1]
+    """Whether a quantity would be off by as much as counts, and no more than it can be.
+
+    A mistake was made or was not: the opposite of one is something else.
+    """
+    if not left > _LEFT * whole:
+        return False
+    off = score / left if name == TRANSFER else abs(score) / left
+    return bool(_MATERIAL[name][0] < off < _MATERIAL[name][1])
 
 
 def _varies(score: Array, left: Array, whole: Array) -> bool:
