@@ -162,7 +162,7 @@ def _add_own(add: _Add) -> None:
         _add_frames(command)
     live = "drop the frames that come while the tracker is busy, as a camera would; else none is dropped"
     track.add_argument("--live", action="store_true", help=live)
-    lag = "smooth each pose with as many frames after it (without --overlay and --mcap)"
+    lag = "smooth each pose with as many frames after it, 1 to 100 (without --overlay and --mcap)"
     track.add_argument("--smooth", type=_lag, default=0, metavar="FRAMES", help=lag)
     calibrate = add(subcommands.calibrate, "find out of a sequence what it shows of your microscope and the eye")
     calibrate.add_argument("frames", type=Path, nargs="+", metavar="FRAMES", help="images, folders of images, videos")
