@@ -17,6 +17,8 @@ from conespot.scene.scene import Scene
 
 #: the ellipsoid is drawn at least so large [px] a pixel of the frame's width, by a factor that stands beside it
 _SHOWN = 0.004
+#: a frame is drawn brighter if this quantile of its pixels is below this share of white
+_BRIGHTEST, _DIM = 0.9999, 0.3
 
 
 def draw_answer(answer: Answer, name: str, scene: Scene, localizer: str, path: Path) -> None:
@@ -25,20 +27,23 @@ def draw_answer(answer: Answer, name: str, scene: Scene, localizer: str, path: P
     saw = account(image, scene, localizer, found)
     lines = {"found": saw.found, "fitted": saw.fitted}
     marks = [Mark("edge seen", edge, "about Z", "dots") for edge in saw.edges if len(edge)]
-    said, distance = "refused", ""
     if isinstance(found, Localization):
         marks += _needle(Needle.of(found, found.seen_in(scene)), scene.camera.shape[1])
         said = f"tip {' '.join(f'{value:.4f}' for value in found.apex_mm)} mm"
-        distance = _distance(found)
+        below = _distance(found)
     else:
-        said = f"refused: {found.reason}"
+        said, below = "refused", f"Refused: {found.reason}."  # which is long: what stands below is wrapped
     white = 1.0 if image.dtype.kind == "f" else float(white_level(image, scene.sensor))
     residuals = [Residual(p.row, p.column, p.side, p.light - p.predicted) for p in saw.patches]
-    safe = {None: "", True: " Safe.", False: " NOT SAFE."}[answer.safe]
+    brightest = float(np.quantile(image, _BRIGHTEST))
+    times = white / brightest if 0.0 < brightest < _DIM * white else 1.0
+    notes = [below, {None: "", True: "Safe.", False: "NOT SAFE."}[answer.safe], RESEARCH]
+    notes += ["Residual: over an even retina."] if residuals else []
+    notes += [f"Drawn {times:.3g} times as bright as it is."] if times > 1.0 else []
     draw_overlay(
-        Overlay(image, white, lines, saw.mask, residuals, marks),
+        Overlay(image, white / times, lines, saw.mask, residuals, marks),
         f"{localizer}, {name}: {said}",
-        f"{distance}{safe} {RESEARCH} Residual: over an even retina.",
+        " ".join(note for note in notes if note),
         path,
     )
 
@@ -48,7 +53,7 @@ def _needle(needle: Needle, columns: int) -> list[Mark]:
         Mark("needle", needle.shaft, "single"),
         Mark("axis to the wall", needle.beam, "about Y"),
         Mark("nearest wall", needle.nearest, "paper"),
-        Mark("tip", needle.tip, "failed", "dots"),
+        Mark("tip", needle.tip, "failed", "point"),
     ]
     if needle.ellipsoid is not None:
         spread = needle.ellipsoid - needle.tip

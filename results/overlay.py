@@ -33,7 +33,7 @@ class Mark:
     name: str
     points: Array
     colour: str
-    how: Literal["line", "closed", "dots"] = "line"
+    how: Literal["line", "closed", "dots", "point"] = "line"  #: a point lies above all else
 
 
 @dataclass(frozen=True, eq=False)
@@ -50,6 +50,12 @@ class Overlay:
     mask: NDArray[np.bool_] | None = None
     residuals: Sequence[Residual] = ()
     marks: Sequence[Mark] = ()
+
+
+def anything_seen(overlay: Overlay) -> bool:
+    """Whether there is anything to draw over the frame."""
+    lines = (points for lines in overlay.lines.values() for points in lines)
+    return any(map(len, lines)) or any(len(mark.points) for mark in overlay.marks)
 
 
 def window(overlay: Overlay) -> tuple[int, int, int, int]:

@@ -11,7 +11,7 @@ from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
-from conespot.results.overlay import Overlay, window
+from conespot.results.overlay import Overlay, anything_seen, window
 from conespot.results.style import COLOURS, frame, style
 from conespot.scene.atomic import write_atomically
 
@@ -29,13 +29,15 @@ LINES: dict[str, tuple[str, Any]] = {
 def draw_overlay(overlay: Overlay, title: str, caption: str, path: Path) -> Path:
     """Write a PNG with a panel each for the frame, its patches, the mask and the residual, as far as there are any.
 
+    Where nothing was seen the frame stands alone.
+
     Raises InputError for a file that cannot be written.
     """
-    panels = [_whole, _near]
+    panels = [_whole, _near] if anything_seen(overlay) else [_whole]
     panels += [_masked] if overlay.mask is not None else []
     panels += [_left_over] if overlay.residuals else []
     with style():
-        figure = Figure(figsize=(4.4 * len(panels), 5.2), layout="constrained")
+        figure = Figure(figsize=(4.4 * max(2, len(panels)), 5.2), layout="constrained")
         frame(figure, title, caption)
         for axes, draw in zip(figure.subplots(1, len(panels), squeeze=False)[0], panels, strict=True):
             axes.grid(False)
@@ -95,8 +97,11 @@ def _draw_lines(axes: Axes, overlay: Overlay) -> None:
             axes.plot(*closed.T, color=colour, linestyle=line, linewidth=1.0, label=None if number else what)
     for mark in overlay.marks:
         points = np.concatenate([mark.points, mark.points[:1]]) if mark.how == "closed" else mark.points
-        line, dot = ("none", ".") if mark.how == "dots" else ("-", "none")
         colour = COLOURS[mark.colour]
+        if mark.how == "point":  # with a rim, to be seen on light, dark and lines
+            axes.plot(*points.T, "o", color=colour, markersize=5.0, markeredgecolor="white", zorder=5, label=mark.name)
+            continue
+        line, dot = ("none", ".") if mark.how == "dots" else ("-", "none")
         axes.plot(*points.T, color=colour, linestyle=line, marker=dot, markersize=2.5, linewidth=1.0, label=mark.name)
 
 

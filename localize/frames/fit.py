@@ -98,15 +98,20 @@ def _whole(name: str, pixels: Pixels, stored: Stored, scene: Scene) -> Pixels:
     if scene.storage.alignment == "left":
         shift = 16 - bits
         value = pixels >> shift
-        # who scales 12 bits to 16 writes their upper bits below them once more
-        if low and not np.array_equal(pixels, (value << shift) | (value >> max(0, 2 * bits - 16))):
+        if low and not _left_aligned(pixels, bits):
             raise InputError(
                 f"{name}: its lower {shift} of 16 bits hold values of their own, so scene.sensor's {bits} bits are not"
                 " left-aligned; write scene.storage.alignment: right, or scene.sensor.bits: 16"
             )
         return value.astype(np.uint8) if full == 255 else value
     if most > full:
-        hint = "write scene.storage.alignment: left if they stand in the upper bits" if most > 2 * full else "check it"
+        # of fewer bits in the upper ones no more than a copy of themselves stands below
+        if most > 2 * full and _left_aligned(pixels, bits):
+            hint = "write scene.storage.alignment: left, if they stand in the upper bits"
+        elif isinstance(sensor, (Linear, Emva)):
+            hint = f"write scene.sensor.bits: {most.bit_length()}, or what the camera has"
+        else:
+            hint = "write the camera's own kind as scene.sensor, or give frames of 8 bits"
         raise InputError(f"{name}: holds values up to {most}, but scene.sensor ends at {full} ({bits} bits); {hint}")
     if bits < 16 and most and not low:
         raise InputError(
@@ -114,6 +119,14 @@ def _whole(name: str, pixels: Pixels, stored: Stored, scene: Scene) -> Pixels:
             " of 16; write scene.storage.alignment: left"
         )
     return pixels.astype(np.uint8) if full == 255 else pixels
+
+
+def _left_aligned(pixels: Pixels, bits: int) -> bool:
+    """Whether values of so many bits may stand in the upper ones of 16, with nothing of their own below."""
+    value = pixels >> (16 - bits)
+    shifted = value << (16 - bits)
+    # who scales 12 bits to 16 writes their upper bits below them once more
+    return np.array_equal(pixels, shifted) or np.array_equal(pixels, shifted | (value >> max(0, 2 * bits - 16)))
 
 
 def _check_transfer(name: str, stored: Stored, scene: Scene) -> None:

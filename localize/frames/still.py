@@ -268,4 +268,4 @@ def _transfer(info: dict[Any, Any]) -> Transfer | None:
 
 def _broken(name: str, kind: str, error: BaseException | None) -> InputError:
     reason = " ".join(str(error).split()) if error is not None and str(error) else "its data end early or are damaged"
-    return InputError(f"{name}: cannot be read as {kind}: {reason[:200]}")
+    return InputError(f"{name}: cannot be read as {kind}: {reason[:200]}; copy or save it again")

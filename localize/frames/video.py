@@ -69,7 +69,7 @@ def read_video(path: Path, scene: Scene) -> Iterator[tuple[float | None, Stored]
                 raise InputError(f"{path}: holds no whole frame; copy or record it again")
     except (av.FFmpegError, OSError, ValueError, MemoryError) as error:
         reason = getattr(error, "strerror", None) or " ".join(str(error).split())
-        raise InputError(f"{path}: cannot be read as a video: {reason}") from None
+        raise InputError(f"{path}: cannot be read as a video: {reason}; copy or record it again") from None
 
 
 def _check_whole(path: Path) -> None:

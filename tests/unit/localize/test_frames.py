@@ -51,6 +51,14 @@ def test_a_dark_frame_in_the_upper_bits_is_known_by_what_its_lower_ones_lack(tmp
         read(tmp_path / "x.png", **LINEAR)
 
 
+def test_values_of_more_bits_than_told_are_no_left_aligned_ones(tmp_path):
+    cv2.imwrite(str(tmp_path / "x.png"), np.minimum(VALUES * 4 + 1, 13832))
+    with pytest.raises(
+        InputError, match=r"holds values up to 13832, .* ends at 4095 \(12 bits\); write scene.sensor.bits: 14"
+    ):
+        read(tmp_path / "x.png", **LINEAR)
+
+
 def test_lower_bits_with_values_of_their_own_are_not_thrown_away(tmp_path):
     cv2.imwrite(str(tmp_path / "x.png"), VALUES)
     with pytest.raises(InputError, match="write scene.storage.alignment: right"):
