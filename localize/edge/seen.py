@@ -18,6 +18,7 @@ from conespot.localize.model.sight import Sight
 from conespot.localize.model.suspicion import TRANSFER, UNEVEN
 from conespot.localize.model.transfer import mistake
 from conespot.scene.beam import CyclesBeam, HardBeam
+from conespot.scene.motion import Tremor
 from conespot.scene.scene import Scene
 
 Array = NDArray[np.float64]
@@ -53,11 +54,12 @@ class Seen:
         """Names `[D]` and derivatives of the light by what is in no scene, a channel each `[D, N]`.
 
         A blur that varies around the outline by one wave or two, where `by_blur` `[N]` are a channel's derivatives by a
-        blur that does not: a lens out of focus on a slope, a tip that moves. And values that were decoded amiss, of
-        hard edges: what the foot of a soft one lacks below a sensor's last level looks the same.
+        blur that does not: a lens out of focus on a slope, a tip that moves (a tremor's way is fitted, and is
+        not quite straight). And values that were decoded amiss, of hard edges: what the foot of a soft one lacks below
+        a sensor's last level looks the same.
         """
         strips = channels[0].strips
-        waves = strips.around[1:, strips.index]
+        waves = strips.around[1 : 1 if isinstance(scene.motion, Tremor) else None, strips.index]
         names, each = [UNEVEN] * len(waves), []
         transfer = mistake(scene.sensor) if isinstance(scene.beam, HardBeam) else None
         for c, channel in enumerate(channels):
