@@ -53,7 +53,8 @@ def otsu_threshold(counts: Counts) -> int:
     between the two.
 
     N. Otsu, A threshold selection method from gray-level histograms, IEEE Trans. SMC 9 (1979), Eq. 18; in the order of
-    cv2.threshold, whose last bit decides between levels that nothing lies between.
+    cv2.threshold. Between levels that part a symmetric histogram equally well the last bit decides, which OpenCV's
+    compiler makes.
     """
     scale = 1.0 / int(counts.sum())
     mean = float(np.arange(256) @ counts) * scale

@@ -169,6 +169,7 @@ def test_report_makes_everything_again_from_the_journal(here, straight):
     assert out == first.stdout
 
 
+@pytest.mark.slow
 def test_one_pose_alone_gives_the_runs_own_row_and_pictures_of_what_was_seen(straight, capsys):
     run = straight[0]
     rows = pd.read_csv(run / "errors.csv")

@@ -103,6 +103,7 @@ def test_they_are_listed_with_their_words_and_what_is_wrong_with_them(campaign):
     assert "is no conespot.localize.localizer.Localizer and no function" in lines["none"]
 
 
+@pytest.mark.slow
 def test_a_campaign_uses_them_and_what_breaks_is_a_failure_row(campaign, tmp_path):
     (tmp_path / "c.yaml").write_text(
         "scene: {preset: paper, camera: {resolution: 100}}\nposes: 1\nsamples: 1\nknowledge: {rcm_sigma: 0.2 mm}\n"

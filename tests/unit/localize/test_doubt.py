@@ -166,7 +166,7 @@ def test_a_patch_on_black_without_noise_and_a_black_reference_are_an_outcome_and
         assert found or found.reason
 
 
-@pytest.mark.parametrize("localizer", ["cone", "photometric"])
+@pytest.mark.parametrize("localizer", ["cone", pytest.param("photometric", marks=pytest.mark.slow)])
 def test_a_soft_patch_told_as_a_hard_one_is_said_to_be_no_hard_one(localizer):
     tip = (0.6, -0.4, 3.0)
     told, world = (scene_of(beam, resolution=SIDE) for beam in (HardBeam(), CyclesBeam()))

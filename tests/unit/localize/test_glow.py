@@ -191,7 +191,9 @@ def test_near_its_last_place_deep_light_goes_on_in_proportion():
     assert glow.light(there, (), sharp(sight, there))[0].value == pytest.approx(whole, rel=0.01)
 
 
-@pytest.mark.parametrize("beam", [HardBeam(), CyclesBeam()], ids=["hard", "soft"])
+@pytest.mark.parametrize(
+    "beam", [pytest.param(HardBeam(), id="hard", marks=pytest.mark.slow), pytest.param(CyclesBeam(), id="soft")]
+)
 def test_a_core_on_a_glow_told_within_a_factor_of_two_is_found_by_its_core(beam):
     """And without a word of it too, since the patch glows beyond its rim: taken for a patch without, the soft one is
     100 um off, and the hard one refused."""

@@ -45,6 +45,7 @@ def test_a_hard_patch_without_texture_is_found_near_the_bound(tip):
     assert sigmas_off(found, pose) < 4.0
 
 
+@pytest.mark.slow
 def test_the_mean_over_noise_of_a_hard_patch_is_unbiased_below_a_fiftieth_of_a_pixel():
     scene = scene_of(HardBeam())
     pose = scene.pose(np.array(TIPS[0]))

@@ -96,6 +96,7 @@ def test_a_tip_near_the_wall_is_found_where_core_and_way_are_as_wide_as_its_patc
     assert abs(found.distance.along_mm - distance) < 4.0 * found.distance.sigma_along_mm < 0.05
 
 
+@pytest.mark.slow
 def test_a_round_light_that_is_no_spot_is_not_taken_for_one(near):
     y, x = np.mgrid[:400, :400] + 0.5
     off = np.hypot(x - 210.0, y - 190.0)

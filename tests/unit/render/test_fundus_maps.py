@@ -67,6 +67,7 @@ def test_vessels_show_in_green_and_nearly_vanish_at_850_nm(name):
     assert abs(density(850.0)) < 0.04
 
 
+@pytest.mark.slow
 def test_a_seed_is_an_eye():
     """Two seeds of the procedural fundus; against each other and themselves: different vessels, repeatable."""
     one, two = (fundus_maps(Fundus(source="procedural", seed=k)) for k in (3, 4))

@@ -156,6 +156,7 @@ def test_a_gross_error_does_not_press_the_others_flat(make_rows):
     assert calm.axes[0].get_yscale() == "linear"
 
 
+@pytest.mark.slow
 def test_the_same_rows_give_the_same_bytes(tmp_path, plan, make_rows):
     drawings = plan(make_rows(poses=8, powers=(0.25, 1.0), trajectories=("box",), rigs=("single",)))
     written = []
