@@ -54,8 +54,8 @@ def calibrate_own(
     """Calibrate a scene from frames and write it with its knowledge; what was found, a line a quantity.
 
     With `shape` the retina's semi-axes are found in place of the eye's radius, with `tilt` which way the camera leans,
-    too. Raises InputError for a scene or frames
-    that cannot be used, fewer than three frames in which the patch can be measured, and a file that cannot be written.
+    too. Raises InputError for a scene or frames that cannot be used, fewer than three frames in which the patch can be
+    measured, and a file that cannot be written.
     """
     given = find_document(name, "scene", "presets", "scene preset")
     if out.exists() and os.path.samefile(out, given):

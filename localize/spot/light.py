@@ -91,8 +91,8 @@ class SpotLight:
             axis = length * pose.axis + shift  # the needle goes on through where it is held
             axis /= np.linalg.norm(axis)
             for x, y in places:
-                one = _cone(sight, pose.apex + shift + x * u + y * v, axis, beta, even, part)
-                value, by_tip, by_axis = one
+                apex = pose.apex + shift + x * u + y * v
+                value, by_tip, by_axis = _cone(sight, apex, axis, beta, even, part)
                 turns = np.stack([u @ by_axis, v @ by_axis])
                 found[0] += value
                 found[1:4] += by_tip
@@ -141,7 +141,6 @@ def _cone(sight: Sight, apex: Array, axis: Array, beta: float, even: Array, way:
     value = bright * ndtr(t)
     edge = bright * np.exp(-0.5 * np.square(t)) / math.sqrt(2.0 * math.pi) / sigma
     # away from the axis an apex leaves the place behind at a smaller angle
-    by_tip = -edge * aside + 3.0 * value / d * to
     inner = value / np.maximum(cosine, 1e-9) / d
-    by_tip = by_tip + inner * sight.normals.T
-    return value, by_tip, edge * d * to / sine * np.sign(sine)
+    by_tip = -edge * aside + 3.0 * value / d * to + inner * sight.normals.T
+    return value, by_tip, edge * d * to / sine
