@@ -59,10 +59,13 @@ WRONG: dict[str, dict[str, Any]] = {
         "scene.camera.optics": {"eye": "navarro", "lens": "aphakic", "contact": "flat", "pupil": "8 mm"},
     },
 }  # fmt: skip
-_RECORDED = {
+_RECORDED: dict[str, Any] = {
     "kind": "recorded", "quality": 90,
     "camera": {"kind": "emva", "chip": "cmv12000-nir", "exposure_time": "8 ms", "f_number": 8.7},
 }  # fmt: skip
+_CAMERA: dict[str, Any] = _RECORDED["camera"]
+#: hardly compressed: its values have gamma and the camera's noise
+_CURVED = {"scene.sensor": _RECORDED | {"quality": 100}}
 _SOFT = {"scene.beam": {"kind": "cycles", "half_angle": "9 deg"}}
 #: without noise there must be light around a patch that stands out
 _LIT = {"scene.ambient.irradiance": "50 W/m2"}
@@ -79,6 +82,9 @@ MORE: dict[str, tuple[dict[str, Any], dict[str, Any]]] = {
     "gamma, soft": (_LIT | _SOFT | {"scene.sensor": _GAMMA}, _LIT | _SOFT | {"scene.sensor": _LINEAR}),
     "linear": (_LIT | {"scene.sensor": _LINEAR}, _LIT | {"scene.sensor": _GAMMA}),
     "linear, soft": (_LIT | _SOFT | {"scene.sensor": _LINEAR}, _LIT | _SOFT | {"scene.sensor": _GAMMA}),
+    "camera's gamma": (_CURVED, {"scene.sensor": _CAMERA}),
+    "camera's gamma, soft": (_SOFT | _CURVED, _SOFT | {"scene.sensor": _CAMERA}),
+    "black": ({"scene.sensor": _CAMERA}, {"scene.sensor": _CAMERA | {"black_level": 64}}),
     "full range": (
         {"scene.sensor": _RECORDED | {"range": "full"}}, {"scene.sensor": _RECORDED | {"range": "limited"}}
     ),

@@ -39,7 +39,7 @@ def cone(
     def localized(start: Start, there: Scene) -> Outcome:
         return edge_outcome(frame, Estimate(start.pose, there), known.within(there), sensor)
 
-    return answered(frame, scene, reference, known, localized)
+    return answered(frame, scene, reference, known, sensor, localized)
 
 
 def edge_outcome(

@@ -9,6 +9,7 @@ from dataclasses import replace
 import numpy as np
 
 from conespot.localize.compression import compressed
+from conespot.localize.decoding import DECODING, decoded_amiss
 from conespot.localize.halo import glowing, glows
 from conespot.localize.image import Frame, Reference
 from conespot.localize.model.estimate import Estimate
@@ -27,32 +28,46 @@ from conespot.scene.sensor import Recorded
 
 #: localizes from a start in a scene
 Localizes = Callable[[Start, Scene], Outcome]
+#: refusals of what the light of a patch looks like: what spoils all of a frame's values explains them better
+_OF_LIGHT = (MISFIT, WRONG_BEAM, WRONG_WALL, GLOWS)
+#: two blocks of a JPEG [px]
+_BLOCKS = 16.0
 
 
-def answered(frame: Frame, scene: Scene, reference: Reference | None, knowns: Knowns, localized: Localizes) -> Outcome:
+def answered(
+    frame: Frame,
+    scene: Scene,
+    reference: Reference | None,
+    knowns: Knowns,
+    noise: NoiseModel,
+    localized: Localizes,
+) -> Outcome:
     """The one answer of a frame that may be believed, or what speaks against it, in words that say what was seen."""
-    outcome = _believable(frame, scene, reference, knowns, localized)
+    outcome, pose = _believable(frame, scene, reference, knowns, localized)
     if isinstance(outcome, LocalizationFailure) and outcome.reason == NOTHING:
         ring = find_rings(Overview.of(frame, reference), scene, 1)[0]
         return LocalizationFailure(OTHER_LIGHT) if ring.votes > START.round else outcome
-    return outcome
+    if pose is None or (isinstance(outcome, LocalizationFailure) and outcome.reason not in _OF_LIGHT):
+        return outcome
+    against = _against(frame, Estimate(pose, scene), noise)
+    return outcome if against is None else LocalizationFailure(against)
 
 
 def _believable(
     frame: Frame, scene: Scene, reference: Reference | None, knowns: Knowns, localized: Localizes
-) -> Outcome:
-    """The one answer of a frame's starts that may be believed, or what speaks against the frame.
+) -> tuple[Outcome, Pose | None]:
+    """The one answer of a frame's starts that may be believed, or why there is none; and where the patch should be.
 
     A scene may say nothing of light from under the retina. Where the frame shows some, the scene is taken to have what
     is usual: the answer is then that scene's, or none, unless the `knowns` say that there is exactly none.
     """
     spot = spot_start(frame, scene, reference)
     if spot is not None:
-        return _answered(frame, scene, (spot,), localized)[0]
+        return _answered(scene, (spot,), localized)
     starts = find_starts(frame, scene, reference)
     lit = None if knowns.deep_amount_sigma == 0.0 else glowing(scene)
     if lit is None:
-        return _answered(frame, scene, starts, localized)[0]
+        return _answered(scene, starts, localized)
 
     def fades(pose: Pose | None) -> bool:
         return pose is not None and glows(frame, Estimate(pose, scene), reference)
@@ -60,17 +75,17 @@ def _believable(
     first = next(starts, None)
     every = () if first is None else itertools.chain([first], starts)
     if first is not None and not fades(first.pose):
-        return _answered(frame, scene, every, localized)[0]
-    found, there = _answered(frame, lit, find_starts(frame, lit, reference), localized)
+        return _answered(scene, every, localized)
+    found, there = _answered(lit, find_starts(frame, lit, reference), localized)
     if isinstance(found, Localization) and fades(there):
-        return found
-    plain, pose = _answered(frame, scene, every, localized)
+        return found, there
+    plain, pose = _answered(scene, every, localized)
     # a start is not yet a patch
-    return LocalizationFailure(GLOWS) if isinstance(plain, Localization) and fades(pose) else plain
+    return (LocalizationFailure(GLOWS) if isinstance(plain, Localization) and fades(pose) else plain), pose
 
 
-def _answered(frame: Frame, scene: Scene, starts: Iterable[Start], localized: Localizes) -> tuple[Outcome, Pose | None]:
-    """The same for a scene as it is, and where the patch is taken to be."""
+def _answered(scene: Scene, starts: Iterable[Start], localized: Localizes) -> tuple[Outcome, Pose | None]:
+    """The same for a scene as it is."""
     tried: list[Start] = []
 
     def followed(start: Start) -> Outcome:
@@ -78,17 +93,21 @@ def _answered(frame: Frame, scene: Scene, starts: Iterable[Start], localized: Lo
         return localized(start, scene)
 
     outcome = believed(starts, scene, followed)
-    pose = tried[0].pose if tried else None
     if isinstance(outcome, Localization):
-        pose = Pose(outcome.apex_mm, outcome.axis, outcome.roll or 0.0)
-    elif outcome.reason not in (MISFIT, WRONG_BEAM, WRONG_WALL):
-        return outcome, pose
-    if pose is None or isinstance(scene.sensor, Recorded):
-        return outcome, pose
-    points = outlines(Estimate(pose, scene))
-    if len(points) and compressed(frame.pixels, *_around(points, scene)):
-        return LocalizationFailure(COMPRESSED), pose
-    return outcome, pose
+        return outcome, Pose(outcome.apex_mm, outcome.axis, outcome.roll or 0.0)
+    return outcome, tried[0].pose if tried else None
+
+
+def _against(frame: Frame, found: Estimate, noise: NoiseModel) -> str | None:
+    """What speaks against how the values of a frame came about, around its patches; None if nothing does."""
+    points = outlines(found)
+    if not len(points):
+        return None
+    rows, columns = _around(points, found.scene, _BLOCKS)
+    if not isinstance(found.scene.sensor, Recorded) and compressed(frame.pixels, rows, columns):
+        return COMPRESSED
+    wide = DECODING.reach * float(np.max(np.ptp(points, axis=0)))
+    return decoded_amiss(frame, noise, *_around(points, found.scene, wide))
 
 
 def noise_of(frame: Frame, told: NoiseModel | None) -> NoiseModel:
@@ -99,9 +118,11 @@ def noise_of(frame: Frame, told: NoiseModel | None) -> NoiseModel:
     return replace(own, levels=frame.steps)
 
 
-def _around(points: np.ndarray[tuple[int, int], np.dtype[np.float64]], scene: Scene) -> tuple[slice, slice]:
-    """Rows and columns of the frame around outlines `[N, 2]` [px], with two blocks of a JPEG beside."""
+def _around(
+    points: np.ndarray[tuple[int, int], np.dtype[np.float64]], scene: Scene, wide: float
+) -> tuple[slice, slice]:
+    """Rows and columns of the frame around outlines `[N, 2]` [px], and so many pixels beside."""
     sides = np.array(scene.camera.shape[::-1])
-    low = np.clip(np.floor(points.min(axis=0)) - 16, 0, sides).astype(int)
-    high = np.clip(np.ceil(points.max(axis=0)) + 16, 0, sides).astype(int)
+    low = np.clip(np.floor(points.min(axis=0)) - wide, 0, sides).astype(int)
+    high = np.clip(np.ceil(points.max(axis=0)) + wide, 0, sides).astype(int)
     return slice(int(low[1]), int(high[1])), slice(int(low[0]), int(high[0]))

@@ -28,6 +28,14 @@ OTHER_LIGHT: Final = (
     "something bright and round stands out, but has not the outline of the scene's beam: beam.kind is cycles or linear "
     "where the light fades out softly, hard where it ends sharply"
 )
+BELOW_BLACK: Final = (
+    "the frame is darker than no light: the black of the scene's sensor is too high (its black_level; or of a recorder,"
+    " the range limited in place of full)"
+)
+WRONG_NOISE: Final = (
+    "the frame's noise does not grow with its light as the scene's sensor says: its values have gamma (srgb8, or"
+    " recorded), or its read_noise is told too small"
+)
 #: reasons of the published methods
 NOTHING_FOUND: Final = "nothing found: no patch stands out of the background"
 NO_LIGHT: Final = "no light of a spotlight: nothing is twice as bright as its surroundings"

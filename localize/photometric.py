@@ -36,7 +36,7 @@ def photometric(
     def localized(start: Start, there: Scene) -> Outcome:
         return patch_outcome(frame, Estimate(start.pose, there), known.within(there), sensor, reference)
 
-    return answered(frame, scene, reference, known, localized)
+    return answered(frame, scene, reference, known, sensor, localized)
 
 
 def patch_outcome(

@@ -5,23 +5,26 @@ from dataclasses import replace
 import cv2
 import numpy as np
 import pytest
-from photographs import NOISE, READ, WHITE, fundus, photograph, scene_of
+from photographs import AMBIENT, NOISE, READ, WHITE, fundus, photograph, scene_of
 from scipy.ndimage import gaussian_filter
 
 from conespot.localize import locate
 from conespot.localize.compression import compressed
+from conespot.localize.decoding import decoded_amiss
 from conespot.localize.doubt import noise_of
 from conespot.localize.image import Frame
 from conespot.localize.model.knowns import Knowns
-from conespot.localize.outcome import COMPRESSED, NO_LIGHT, OTHER_LIGHT
+from conespot.localize.outcome import BELOW_BLACK, COMPRESSED, NO_LIGHT, OTHER_LIGHT, WRONG_NOISE
 from conespot.localize.start.search import NOTHING, TWO_PLACES
 from conespot.localize.verdict import WRONG_BEAM, WRONG_TRANSFER, WRONG_WALL
 from conespot.scene import InputError, Scene
 from conespot.scene.beam import CyclesBeam, HardBeam
 from conespot.scene.camera import Camera
+from conespot.scene.emva import EMVA_PRESETS
 from conespot.scene.eye import Eye
 from conespot.scene.population import SEMI_AXES_SIGMA_MM
 from conespot.scene.sensor import Linear, Recorded, Srgb8
+from conespot.scene.srgb import encoded
 from conespot.scene.surface import Surface
 
 SIDE = 400
@@ -39,6 +42,14 @@ def soft():
 def clipped(frames):
     scene = frames.make_scene(resolution=SIDE, beam=CyclesBeam())
     return scene, frames.frame(scene, scene.pose(np.array(HERE)))
+
+
+def around(scene):
+    """Rows and columns of a patch and half its size beside."""
+    points = scene.camera.project(scene.outline(scene.pose(np.array(HERE)), 0))
+    wide = 0.5 * np.max(np.ptp(points, axis=0))
+    low, high = (points.min(axis=0) - wide).astype(int), (points.max(axis=0) + wide).astype(int)
+    return slice(low[1], high[1]), slice(low[0], high[0])
 
 
 def off_um(found, tip=HERE):
@@ -153,6 +164,69 @@ def test_linear_values_that_are_told_to_have_gamma_are_refused_for_it():
     assert found, found.reason
     assert not told
     assert told.reason == WRONG_TRANSFER
+
+
+@pytest.mark.parametrize("bits", [8, 12])
+@pytest.mark.parametrize("beam", [CyclesBeam(), HardBeam()])
+def test_noise_tells_values_with_gamma_that_are_told_to_be_linear_and_no_texture_passes_for_them(beam, bits):
+    """Gamma puts hard patches 8 um off and soft ones 55, in no residual of a fit."""
+    scene = scene_of(beam, resolution=SIDE)
+    full, noise = 2**bits - 1, replace(NOISE, levels=2**bits - 1)
+    told = scene.model_copy(update={"sensor": Linear(bits=bits)})
+    for texture in (None, fundus(0.2)):
+        light = photograph(scene, scene.pose(np.array(HERE)), texture, rays=4) / 4095.0
+        linear, curved = (
+            np.round(x * full).astype(np.uint8 if bits == 8 else np.uint16) for x in (light, encoded(light))
+        )
+        assert decoded_amiss(Frame(linear, told.sensor), noise, *around(scene)) is None
+        assert decoded_amiss(Frame(curved, told.sensor), noise, *around(scene)) == WRONG_NOISE
+        assert decoded_amiss(Frame(curved, Srgb8()), noise, *around(scene)) is None
+    assert locate(linear, told, "photometric", noise=noise)
+    found = locate(curved, told, "photometric", noise=noise)
+    assert not found
+    assert found.reason in (WRONG_NOISE, WRONG_TRANSFER)
+
+
+@pytest.mark.parametrize("change", ["read noise twice as large", "smoothed", "median", "bilateral", "compressed"])
+def test_no_smoothing_and_no_read_noise_looks_like_gamma(change):
+    scene = scene_of(CyclesBeam(), resolution=SIDE)
+    image = photograph(scene, scene.pose(np.array(HERE)), rays=2)
+    match change:
+        case "read noise twice as large":
+            extra = np.sqrt(3.0) * READ / WHITE * 4095.0 * np.random.default_rng(2).standard_normal(image.shape)
+            seen = np.clip(np.round(image + extra), 0, 4095)
+        case "smoothed":
+            seen = gaussian_filter(image.astype(float), 1.0)
+        case "median":
+            seen = cv2.medianBlur(image, 3)
+        case "bilateral":
+            seen = cv2.bilateralFilter(image.astype(np.float32), 5, 100.0, 2.0)
+        case _:
+            eight = np.round(image / 4095.0 * 255.0).astype(np.uint8)
+            seen = cv2.imdecode(cv2.imencode(".jpg", eight)[1], cv2.IMREAD_GRAYSCALE) * (4095.0 / 255.0)
+    assert decoded_amiss(Frame(seen.astype(np.uint16), scene.sensor), NOISE, *around(scene)) is None
+
+
+def test_a_frame_darker_than_black_is_refused_and_says_where_black_is_told():
+    """A pedestal that was taken off already, and a full range told as the limited one."""
+    scene = scene_of(HardBeam(), resolution=SIDE)
+    light = photograph(scene, scene.pose(np.array(HERE)), rays=4, noise=False) / 4095.0 * WHITE
+    rng = np.random.default_rng(1)
+    electrons = rng.poisson(np.maximum(light - AMBIENT, 0.0)) + READ * rng.standard_normal(light.shape)
+    dark = electrons / WHITE * 4095.0
+    camera = EMVA_PRESETS["cmv12000-mono"]
+    right, without = (np.clip(np.round(dark + black), 0, 4095).astype(np.uint16) for black in (camera.black_level, 0.0))
+    recorder = Recorded(camera=Linear())
+    codes = np.round(recorder.code(np.clip(dark / 4095.0, 0.0, 1.0))).astype(np.uint8)
+    for image, sensor, amiss in (
+        (right, camera, None),
+        (without, camera, BELOW_BLACK),
+        (codes, recorder, None),
+        (codes, recorder.model_copy(update={"range": "limited"}), BELOW_BLACK),
+    ):
+        assert decoded_amiss(Frame(image, sensor), sensor.noise, *around(scene)) == amiss
+    told = scene.model_copy(update={"sensor": camera})
+    assert locate(without, told, "photometric").reason == BELOW_BLACK
 
 
 @pytest.mark.filterwarnings("error::RuntimeWarning")
