@@ -89,9 +89,9 @@ def halo(frame: Frame, estimate: Estimate, reference: Reference | None, width: f
     high = np.clip(every.max(axis=0) + HALO.far[1] * size, 0, scene.camera.shape[::-1]).astype(int)
     step = max(1, int(np.max(high - low)) // HALO.across)
     rows, columns = slice(int(low[1]), int(high[1]), step), slice(int(low[0]), int(high[0]), step)
-    light = frame.light(rows, columns)[0].astype(float).mean(axis=2)
+    light = frame.signal(rows, columns).astype(float).mean(axis=2)
     if reference is not None:
-        ground = Frame(reference.pixels, scene.sensor).light(rows, columns)[0].astype(float).mean(axis=2)
+        ground = Frame(reference.pixels, scene.sensor).signal(rows, columns).astype(float).mean(axis=2)
         level = float(np.median(ground))
         if level > 0.0:  # a black one says nothing
             light = light / np.maximum(ground, 1e-3 * level)

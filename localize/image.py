@@ -92,9 +92,22 @@ class Frame:
 
     def light(self, rows: slice, columns: slice) -> tuple[Signal, NDArray[np.bool_]]:
         """Signals [white] of some pixels, and which of them are clipped and only bounds: `[h, w, C]` each."""
+        seen = self._every_channel(rows, columns)
+        return linear_light(seen, self.sensor, self.ringing)
+
+    def signal(self, rows: slice, columns: slice) -> Signal:
+        """The same without what is clipped."""
+        return signals(self._every_channel(rows, columns), self.sensor)
+
+    def at(self, row: NDArray[np.intp], column: NDArray[np.intp]) -> tuple[Signal, NDArray[np.bool_]]:
+        """Signals [white] of single pixels, and which of them are clipped: `[N, C]` each."""
+        seen = self.pixels[row, column]
+        return linear_light(seen.reshape(len(row), -1), self.sensor, self.ringing)
+
+    def _every_channel(self, rows: slice, columns: slice) -> AnyImage:
+        """Pixel values `[h, w, C]`."""
         seen = np.ascontiguousarray(self.pixels[rows, columns])
-        signal, clipped = linear_light(seen, self.sensor, self.ringing)
-        return signal.reshape(*signal.shape[:2], -1), clipped.reshape(*clipped.shape[:2], -1)
+        return seen.reshape(*seen.shape[:2], -1)
 
 
 @dataclass(frozen=True, eq=False)
@@ -139,26 +152,32 @@ def linear_light(pixels: AnyImage, sensor: ImageSensor, ringing: float = 0.0) ->
     uint8: 255 is white, or what fewer bits end at; uint16: the sensor's full scale; float: 1.0. Raises InputError for
     any other type.
     """
+    signal, least = signals(pixels, sensor), sensor.clips_from - ringing * sensor.noise.compression / sensor.full_scale
+    if pixels.dtype.kind == "f":
+        return signal, pixels.astype(np.float32) >= least
+    shares = _shares(white_level(pixels, sensor), pixels.dtype.itemsize)
+    return signal, pixels >= int(np.searchsorted(shares, least))
+
+
+def signals(pixels: AnyImage, sensor: ImageSensor) -> Signal:
+    """Signals [white] of pixel values, as `linear_light` has them."""
     if pixels.dtype == np.uint8 or pixels.dtype == np.uint16:
-        full = white_level(pixels, sensor)
-        signal, clipped = _tables(sensor, full, 256 if pixels.dtype == np.uint8 else 65536, ringing)
-        return signal[pixels], clipped[pixels]
+        return _table(sensor, white_level(pixels, sensor), pixels.dtype.itemsize).take(pixels)
     if np.issubdtype(pixels.dtype, np.floating):
-        share = pixels.astype(np.float32)
-        return sensor.decode(share.astype(float)).astype(np.float32), share >= _clips_from(sensor, ringing)
+        return sensor.decode(pixels.astype(np.float32).astype(float)).astype(np.float32)
     raise InputError(f"an image must be uint8, uint16 or float, not {pixels.dtype}")
 
 
 @lru_cache(maxsize=8)
-def _tables(sensor: ImageSensor, full: int, size: int, ringing: float) -> tuple[Signal, NDArray[np.bool_]]:
-    """Signal, and whether it is clipped, of every pixel value `[size]`."""
-    share = np.minimum(np.arange(size) / full, 1.0)
-    return sensor.decode(share).astype(np.float32), share >= _clips_from(sensor, ringing)
+def _table(sensor: ImageSensor, full: int, size: int) -> Signal:
+    """Signal of every value that pixels of so many bytes can have."""
+    return sensor.decode(_shares(full, size)).astype(np.float32)
 
 
-def _clips_from(sensor: ImageSensor, ringing: float) -> float:
-    """The share from which on values count as clipped."""
-    return sensor.clips_from - ringing * sensor.noise.compression / sensor.full_scale
+@lru_cache(maxsize=8)
+def _shares(full: int, size: int) -> NDArray[np.float64]:
+    """Every value that pixels of so many bytes can have, over white."""
+    return np.asarray(np.minimum(np.arange(256**size) / full, 1.0))
 
 
 def grey8(image: AnyImage, scene: Scene) -> NDArray[np.uint8]:

@@ -122,7 +122,7 @@ def fit_again(
     rim = Rim.about(curve, scene, side, level.inner + reach, level.outer + reach)
     if rim is None:
         return None
-    shown = [plane.at(*rim.cells) for plane in Shown.each(frame, rim.window)]
+    shown = Shown.in_cells(frame, rim.window, *rim.cells)
     if any(np.count_nonzero(plane.usable) < (1.0 - AGAIN.clipped) * len(plane.usable) for plane in shown):
         return None
     sight, irradiance = before.ground.under(rim.window, rim.cells)

@@ -20,7 +20,7 @@ from conespot.localize.edge.ribbon import Ribbon
 from conespot.localize.edge.sandwich import EdgeFit
 from conespot.localize.edge.seen import Seen
 from conespot.localize.edge.settings import EDGE
-from conespot.localize.edge.strips import Eliminated, score_covariance
+from conespot.localize.edge.strips import Eliminated, of_shared, score_covariance
 from conespot.localize.edge.surroundings import surroundings
 from conespot.localize.image import Frame, Reference
 from conespot.localize.model.deep import Deep
@@ -32,7 +32,6 @@ from conespot.localize.model.knowns import Knowns
 from conespot.localize.model.noise import NoiseModel
 from conespot.localize.model.prior import prior_rows
 from conespot.localize.model.quantity import quantity
-from conespot.localize.model.sight import look
 from conespot.localize.model.solve import limited, reduction, solved
 from conespot.localize.model.suspicion import matter, watched
 from conespot.localize.model.suspicion import scores as score_tests
@@ -138,10 +137,10 @@ class BandFit(EdgeFit):
         of: NDArray[np.intp],
     ) -> dict[str, float]:
         """Scores of the last of some shared parameters `of` all, which have those `names`."""
-        rows = [*of, *range(len(gradient), len(channels[0].jacobian))]
+        rows = [*of, len(gradient)]  # and the gain's
         kept = [copy(channel) for channel in channels]
         for channel in kept:
-            channel.jacobian = channel.jacobian[rows]
+            channel.rows = channel.rows[rows]
         scores, parts, known = self._strips(kept, prior[:, of])
         follows = float(np.mean([channel.follows for channel in channels]))
         return score_tests(
@@ -157,12 +156,12 @@ class BandFit(EdgeFit):
         known = prior.T @ prior
         for channel in channels:
             gradient, own = channel.scores()
-            whole = own.sum(axis=0)
+            whole = own.sum(axis=2)
             whole[range(size, len(whole)), range(size, len(whole))] += channel.precision
             reduced = reduction(whole, size)
             known = known + (reduced[:, size:] * channel.precision) @ reduced[:, size:].T
-            scores = scores + gradient @ reduced.T / channel.follows
-            parts = parts + reduced @ own @ reduced.T
+            scores = scores + (reduced @ gradient).T / channel.follows
+            parts = parts + of_shared(own, reduced)
         return scores, parts, known
 
 
@@ -193,7 +192,7 @@ def fit_band(
     band = replace(band, strips=replace(band.strips, sloping=not stage.sharp))
     if reference is not None:
         band = band.told(reference, nominal, noise)
-    sight = look(nominal, band.pixels, side)
+    sight = band.sight
     irradiance = ambient_irradiance(sight, nominal)
     pitch = nominal.camera.pixel_pitch * side
     shed = Irradiance(sight, band.pixels, side, estimate, knowns, np.ones(len(band.pixels), bool))

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from conespot.localize.edge.nuisances import Nuisances, first_levels
 from conespot.localize.edge.settings import EDGE
-from conespot.localize.edge.strips import Strips, strip_scores
+from conespot.localize.edge.strips import Strips, of_shared, strip_scores
 from conespot.localize.model.noise import NoiseModel
 from conespot.localize.model.residual import RESIDUAL, follows, incident_light, median, rest, rms
 from conespot.localize.model.view import Shown
@@ -212,16 +212,14 @@ class Channel:
 
         And the covariance `[size, size]` of what the channel's own priors add to the gradient.
         """
-        rows = np.concatenate(
-            [self._rows[:size], self._rows[self._size :], np.ones((1, len(self._weights))), self.strips.slow]
-        )
+        rows = np.concatenate([self._rows[:size], self._rows[self._size :]])
         gradient, own = strip_scores(
             self.strips, rows, self._residual, self._weights, self._levels, np.asarray(self._spread)
         )
-        whole = own.sum(axis=0)
+        whole = own.sum(axis=2)
         mine = np.arange(size, len(whole))
         whole[mine, mine] += self._precision
         taken = np.concatenate([np.eye(size), -np.linalg.solve(whole[size:, size:], whole[size:, :size]).T], axis=1)
         known = (taken[:, size:] * self._precision) @ taken[:, size:].T
         follow = follows(self._weights * np.square(rows[size]), self._whitened)
-        return gradient @ taken.T / follow, taken @ own @ taken.T, known
+        return (taken @ gradient).T / follow, of_shared(own, taken), known

@@ -17,6 +17,7 @@ from conespot.localize.model.residual import (
     incident_light,
     log_likelihood,
     log_residuals,
+    quantile,
     rest,
     rms,
     student_weights,
@@ -59,14 +60,14 @@ class Nuisances:
         brightness = np.exp(shown.template) * incident
         if math.isnan(self.level):
             self._begin(brightness)
-        albedo = self.level + self.slow @ self.strips.slow + self.strips.log_albedo(self.levels)
+        albedo = self.level + self.strips.log_albedo(self.levels, self.slow)
         self.model = model = np.exp(albedo) * brightness
         residual, bound = log_residuals(shown, model)
         use = shown.usable | bound
         variance = self.noise.variance(model) / self.pixels / np.square(np.maximum(model, 1e-9))
         # the scatter that counts is that of the bins which hold the edge, and it tells how far the edge still is off
         pull = np.abs(rows[2]) / incident
-        steady = use & (pull > EDGE.steady * np.quantile(pull, 0.98))
+        steady = use & (pull > EDGE.steady * quantile(pull, 0.98))
         if np.count_nonzero(steady) > 30:
             self.white = rest(residual[steady], variance[steady], self.white)
         variance = variance + self.white**2
@@ -80,16 +81,14 @@ class Nuisances:
             whitened = residual / np.sqrt(variance)
         self.weights = worth / variance * student_weights(whitened)
         share = g / incident
-        self.jacobian = np.concatenate(
-            [share * rows, (share * light)[None], np.ones((1, len(model))), self.strips.slow]
-        )
+        self.rows = np.concatenate([share * rows, (share * light)[None]])
         self.residual = residual
-        self.follows = follows(self.weights * np.square(self.jacobian[len(rows)]), whitened)
+        self.follows = follows(self.weights * np.square(self.rows[-1]), whitened)
 
     def _begin(self, brightness: Array) -> None:
         """Take what bins show over the model's brightness `[N]` for the albedo."""
         self.level, self.levels = first_levels(self.shown, self.strips, brightness, len(self.spread))
-        self.slow, self.slow_spread = np.zeros(len(self.strips.slow)), float(self.spread[1])
+        self.slow, self.slow_spread = np.zeros(len(self.strips.slow[0])), float(self.spread[1])
 
     @property
     def likelihood(self) -> float:
@@ -107,28 +106,28 @@ class Nuisances:
     def eliminated(self, size: int, profile: float | None = None) -> Eliminated:
         """The normal equations of `size` shared parameters, gain, level and slow slopes, the strips' own eliminated.
 
-        With a `profile` the mean log light at each whole distance from the outlines joins them, so far not known [1].
+        With a `profile` the mean log light at each whole distance from the outlines joins them behind the gain, so far not
+        known [1].
         """
-        data = self.residual + self.strips.log_albedo(self.levels)
-        jacobian, precision = self.jacobian, self.precision
+        data = self.residual + self.strips.log_albedo(self.levels, np.zeros_like(self.slow))
+        rows, precision = self.rows, self.precision
         if profile is not None:
             distance = np.round(self.strips.offset)
-            jacobian = np.concatenate([jacobian, distance == np.unique(distance)[:, None]])
-        part = Eliminated.of(self.strips, jacobian, data, self.weights, self.spread)
-        last = size + len(precision)
-        own = range(size, last)
+            rows = np.concatenate([rows, distance == np.unique(distance)[:, None]])
+        part = Eliminated.of(self.strips, rows, data, self.weights, self.spread)
+        own = [size, *range(len(rows), len(part.gradient))]
         part.information[own, own] += precision
-        part.gradient[size + 2 : last] -= precision[2:] * self.slow
+        part.gradient[own[2:]] -= precision[2:] * self.slow
         if self.told is not None:
             part.gradient[size] -= precision[0] * (self.gain - self.told[0])
         if profile is not None:
-            across = range(last, len(part.gradient))
+            across = range(size + 1, len(rows))
             part.information[across, across] += profile**-2
         return part
 
     def scores(self) -> tuple[Array, Array]:
-        """The strips' own gradients `[S, P]` and informations `[S, P, P]`."""
-        return strip_scores(self.strips, self.jacobian, self.residual, self.weights, self.levels, self.spread)
+        """The strips' own gradients `[P, S]` and informations `[P, P, S]`."""
+        return strip_scores(self.strips, self.rows, self.residual, self.weights, self.levels, self.spread)
 
     @property
     def slow_scatter(self) -> float:
@@ -148,7 +147,7 @@ class Nuisances:
         self.level += float(own[1])
         self.slow = self.slow + own[2:]
         self.levels = part.levels(step)
-        known = np.maximum(1.0 - part.variance / self.spread**2, 0.0).sum(axis=0)
+        known = np.maximum(1.0 - part.variance / self.spread[:, None] ** 2, 0.0).sum(axis=1)
         found = np.sqrt(np.square(self.levels).sum(axis=0) / np.maximum(known, 1.0))
         self.spread = np.clip(found, self.smallest, EDGE.widest * self.spread)
         # albedo has no direction: across the outline it changes as much as along

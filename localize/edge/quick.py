@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,7 +19,6 @@ from conespot.localize.model.profile import Profile
 from conespot.localize.model.sight import Sight
 from conespot.localize.model.smooth import under_gaussian
 from conespot.localize.model.spread import Spread
-from conespot.scene.beam import Beam
 from conespot.scene.pose import Pose
 
 Array = NDArray[np.float64]
@@ -56,7 +54,7 @@ class QuickBeam:
     def __init__(self, sight: Sight, near: Estimate) -> None:
         """Near an estimate, whose scene says how the image is spread."""
         scene = near.scene
-        self._profile, self._spread = _profile(scene.beam), Spread.of(scene, sight, near.pose)
+        self._profile, self._spread = Profile.of(scene.beam), Spread.of(scene, sight, near.pose)
         # components first: the sums over them are a third of the time
         every = (sight.points, sight.normals, sight.along_x, sight.along_y)
         self._points, self._normals, self._right, self._down = (np.ascontiguousarray(part.T) for part in every)
@@ -181,12 +179,6 @@ class _Geometry:
     by_tip: Array | None
     tips: Array  #: covariance of the tip's places `[3, 3]` [mm^2]
     falloff: Array
-
-
-@lru_cache(maxsize=8)
-def _profile(beam: Beam) -> Profile:
-    """A track has one beam."""
-    return Profile.of(beam)
 
 
 def _dot(a: Array, b: Array) -> Array:

@@ -15,8 +15,8 @@ from conespot.localize.image import Frame, Reference
 from conespot.localize.model.estimate import Estimate
 from conespot.localize.model.noise import NoiseModel
 from conespot.localize.model.occlusion import covered
-from conespot.localize.model.outline import distances
-from conespot.localize.model.sight import look
+from conespot.localize.model.outline import Off
+from conespot.localize.model.sight import Sight, look
 from conespot.localize.model.view import Shown, Window, log_albedo
 from conespot.scene.scene import Scene
 from conespot.scene.spotlights import spotlight_axes
@@ -30,6 +30,7 @@ class Ribbon:
     """Bins of an image along the outlines of an estimate."""
 
     pixels: Array  #: centres of the bins `[N, 2]` [px]
+    sight: Sight  #: what they see
     spots: NDArray[np.intp]  #: the spotlight whose outline is nearest `[N]`
     shown: tuple[Shown, ...]  #: what the bins show, `[N]` each
     strips: Strips
@@ -68,8 +69,9 @@ class Ribbon:
             cv2.polylines(mask, [np.round(points - low).astype(np.int32)], True, 1, 2 * reach + 1)
         row, column = np.nonzero(mask)
         pixels = (np.stack([column + low[0], row + low[1]], axis=1) + 0.5) * side
-        spots, alone = _nearest_outline(pixels, estimate)
-        distance = distances(pixels, spots, estimate)[0] / side
+        sight = look(scene, pixels, side)
+        spots, alone = _nearest_outline(sight, estimate)
+        distance = Off.of(sight, spots, estimate).distance
         keep = np.isfinite(distance) & alone & (distance > -inner) & (distance < outer)
         keep &= ~covered(pixels, estimate.pose, scene, side=side) & seen_whole(scene.camera, pixels)
         if np.count_nonzero(keep) < EDGE.fewest_bins:
@@ -83,8 +85,9 @@ class Ribbon:
         turns = tuple(slice(*np.searchsorted(spot, [k, k + 1])) for k in np.unique(spot))
         strips = Strips(compact, distance[order], first, turns)
         cells = row[order], column[order]
-        shown = tuple(plane.at(*cells) for plane in Shown.each(frame, at))
-        return cls(pixels[order], spots[order], shown, strips, float(np.mean(seen)), at, cells)
+        shown = tuple(Shown.in_cells(frame, at, *cells))
+        seen_there = sight.part(np.flatnonzero(keep)[order])
+        return cls(pixels[order], seen_there, spots[order], shown, strips, float(np.mean(seen)), at, cells)
 
     def told(self, reference: Reference, scene: Scene, noise: NoiseModel) -> Ribbon:
         """The same with the albedo that a reference shows."""
@@ -110,9 +113,11 @@ def _strip_of(
     return result
 
 
-def _nearest_outline(pixels: Array, estimate: Estimate) -> tuple[NDArray[np.intp], NDArray[np.bool_]]:
-    """Which cone's outline each pixel `[N, 2]` [px] lies nearest to, and whether no other cone covers it."""
-    to = look(estimate.scene, pixels).points - estimate.pose.apex
+def _nearest_outline(sight: Sight, estimate: Estimate) -> tuple[NDArray[np.intp], NDArray[np.bool_]]:
+    """Which cone's outline each pixel `[N]` lies nearest to, and whether no other cone covers it."""
+    if len(estimate.scene.spotlights) == 1:
+        return np.zeros(len(sight.points), np.intp), np.ones(len(sight.points), bool)
+    to = sight.points - estimate.pose.apex
     to /= np.linalg.norm(to, axis=1, keepdims=True)
     axes = spotlight_axes(estimate.pose, estimate.scene.spotlights)
     off = np.arccos(np.clip(to @ axes.T, -1.0, 1.0)) - estimate.scene.beam.half_angle

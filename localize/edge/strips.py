@@ -38,29 +38,27 @@ class Strips:
         """Sums over the strips `[..., S]` of values of the bins `[..., N]`."""
         return np.asarray(np.add.reduceat(values, self.first, axis=-1))
 
-    @property
-    def slow(self) -> Array:
-        """What varies with harmonics 0 to 2 around each outline, the pose's, at each bin: slopes, levels and odds.
+    @cached_property
+    def own(self) -> Array:
+        """What a strip's own quantities, level, slope and odds if it has any, do to its bins' log light `[2 or 3, N]`."""
+        return np.stack([np.ones_like(self.offset), self.offset, *([] if self.odds is None else [self.odds])])
 
-        `[5 T, N]`, along a slope `[10 T, N]` and with odds `[15 T, N]`. Without them a step in the light is so high
-        that what a prior of strips which know nothing of each other leaves of smooth levels moves no edge. A slope it
-        moves: to such a prior one wave of levels is as unlikely as noise of their size, and a turned axis likelier.
+    @cached_property
+    def slow(self) -> tuple[NDArray[np.intp], Array]:
+        """What varies with harmonics 0 to 2 around each outline, the pose's: slopes, levels and odds.
+
+        Which of a strip's own quantities each is `[Q]`, and how much of it the strips have `[Q, S]`: `5 T` of them,
+        along a slope `10 T` and with odds `15 T`. Without them a step in the light is so high that what a prior of
+        strips which know nothing of each other leaves of smooth levels moves no edge. A slope it moves: to such a prior
+        one wave of levels is as unlikely as noise of their size, and a turned axis likelier.
         """
-        if not self.slow_levels:
-            return self._slow_slopes
-        levels = self.waves[:, self.index]
-        if self.odds is None:
-            return np.concatenate([self._slow_slopes, levels])
-        return np.concatenate([self._slow_slopes, levels, levels * self.odds])
+        kinds = np.array([1, 0, 2][: 1 + self.slow_levels], np.intp)
+        return np.repeat(kinds, len(self.waves)), np.tile(self.waves, (len(kinds), 1))
 
     @property
     def slow_levels(self) -> int:
         """How many quantities beside the slopes vary slowly: none, levels, or levels and odds."""
         return int(self.sloping) if self.odds is None else 2
-
-    @cached_property
-    def _slow_slopes(self) -> Array:
-        return np.asarray(self.waves[:, self.index] * self.offset)
 
     def gradient(self, levels: Array) -> float:
         """Rms by which levels `[S]` of width `WIDTH` change along the outlines [1/bin]."""
@@ -90,10 +88,13 @@ class Strips:
             found.append(float(np.mean(np.square(rise)) / 2.0))
         return float(np.sqrt(np.mean(found)))
 
-    def log_albedo(self, levels: Array) -> Array:
-        """What the strips' own `[S, 2 or 3]`, level, slope and odds, do to the log light of each bin `[N]`."""
-        found = levels[self.index, 0] + levels[self.index, 1] * self.offset
-        return np.asarray(found if self.odds is None else found + levels[self.index, 2] * self.odds)
+    def log_albedo(self, levels: Array, slow: Array) -> Array:
+        """What the strips' own `[S, 2 or 3]`, level, slope and odds, and `slow` ones `[Q]` do to each bin's log light."""
+        kinds, amounts = self.slow
+        own = levels.copy()
+        for kind in range(own.shape[1]):
+            own[:, kind] += slow[kinds == kind] @ amounts[kinds == kind]
+        return np.asarray(np.einsum("kn,kn->n", self.own, own.T[:, self.index]))
 
 
 @lru_cache(maxsize=64)
@@ -104,71 +105,116 @@ def _harmonics(count: int) -> Array:
 
 
 @dataclass(frozen=True)
+class Moments:
+    """Sums over the strips of weighted products of columns, of which there are rows of a Jacobian, the same level of all
+    strips, what varies slowly, and the data.
+
+    Only rows and data are looked at bin by bin: within a strip all else is one of its own quantities.
+    """
+
+    strips: Strips
+    rows: Array  #: `[R, N]`
+    weighted: Array  #: rows and data, times the bins' weights `[R + 1, N]`
+    own: Array  #: products of the strips' own quantities `[2 or 3, 2 or 3, S]`
+    right: Array  #: of those with all columns `[2 or 3, P + 1, S]`
+    kinds: NDArray[np.intp]  #: which of its own quantities a strip has of each column but the rows and the data `[Q]`
+    amounts: Array  #: and how much of it `[Q, S]`
+
+    @classmethod
+    def of(cls, strips: Strips, rows: Array, data: Array, weights: Array) -> Moments:
+        """Of rows `[R, N]`, data and weights `[N]`."""
+        weighted = np.concatenate([rows, data[None]]) * weights
+        columns, size = strips.own, len(weighted)
+        sums = strips.sums(np.concatenate([weighted, weights * columns, *(weighted * own for own in columns[1:])]))
+        # the first is 1 throughout
+        right = np.stack([sums[:size], *sums[size + len(columns) :].reshape(-1, size, strips.count)])
+        each = np.empty((len(columns), len(columns), strips.count))
+        each[0] = sums[size : size + len(columns)]
+        each[1:, 0] = each[0, 1:]
+        for k in range(1, len(columns)):
+            each[k, k:] = strips.sums(weights * columns[k] * columns[k:])
+            each[k:, k] = each[k, k:]
+        slow, amounts = strips.slow
+        kinds, amounts = np.append(0, slow), np.concatenate([np.ones((1, strips.count)), amounts])
+        every = np.concatenate([right[:, :-1], each[:, kinds] * amounts, right[:, -1:]], axis=1)
+        return cls(strips, rows, weighted, each, every, kinds, amounts)
+
+    def total(self) -> Array:
+        """Products of all columns and the data with all columns, over all strips `[P + 1, P]`."""
+        size = len(self.rows)
+        found = np.empty((self.right.shape[1], self.right.shape[1] - 1))
+        found[:, size:] = (self.right[self.kinds] @ self.amounts[..., None])[..., 0].T
+        found[size:-1, :size] = found[:size, size:].T
+        found[[*range(size), -1], :size] = self.weighted @ self.rows.T
+        return found
+
+    def each(self) -> Array:
+        """The same strip by strip `[P + 1, P, S]`."""
+        size, strips = len(self.rows), self.strips
+        found = np.empty((self.right.shape[1], self.right.shape[1] - 1, strips.count))
+        found[:, size:] = (self.right[self.kinds] * self.amounts[:, None]).transpose(1, 0, 2)
+        found[size:-1, :size] = found[:size, size:].transpose(1, 0, 2)
+        for k, row in enumerate(self.rows):
+            found[k:size, k] = found[k, k:size] = strips.sums(self.weighted[k:-1] * row)
+            found[-1, k] = strips.sums(self.weighted[-1] * row)
+        return found
+
+    def solved(self, spread: Array) -> tuple[Array, Array]:
+        """Each strip's own for every column `[2 or 3, P + 1, S]`, and their variances; `spread` are prior sigmas."""
+        if len(self.own) > 2:
+            covariance = np.linalg.inv(self.own.transpose(2, 0, 1) + np.diag(spread**-2))
+            return np.einsum("sij,jps->ips", covariance, self.right), np.einsum("sii->is", covariance)
+        a, b, d = self.own[0, 0] + spread[0] ** -2, self.own[0, 1], self.own[1, 1] + spread[1] ** -2
+        det = a * d - b * b
+        flat, sloped = self.right
+        return np.stack([d * flat - b * sloped, a * sloped - b * flat]) / det, np.stack([d, a]) / det
+
+
+@dataclass(frozen=True)
 class Eliminated:
     """Normal equations with every strip's level and slope, and its odds if it has any, eliminated."""
 
     information: Array  #: `[P, P]`
     gradient: Array  #: `[P]`
-    start: Array  #: levels, slopes and odds without a step `[S, 2 or 3]`
-    gain: Array  #: and how the parameters change them `[S, 2 or 3, P]`
-    variance: Array  #: of levels, slopes and odds `[S, 2 or 3]`
+    own: Array  #: by the parameters and, last, without a step: how levels, slopes and odds change `[2 or 3, P + 1, S]`
+    variance: Array  #: of levels, slopes and odds `[2 or 3, S]`
 
     def levels(self, step: Array) -> Array:
         """Level, slope and odds of every strip `[S, 2 or 3]` after `step` `[P]`."""
-        return np.asarray(self.start - self.gain @ step)
+        return np.asarray((np.append(-step, 1.0) @ self.own).T)
 
     @classmethod
-    def of(cls, strips: Strips, jacobian: Array, data: Array, weights: Array, spread: Array) -> Eliminated:
-        """From a Jacobian `[P, N]`, data and weights `[N]`; `spread` `[2 or 3]`: prior sigmas of the strips' own."""
-        weighted = np.concatenate([jacobian, data[None]]) * weights
-        right, solved, variance = _strip_equations(strips, weighted, weights, spread)
-        cross = np.tensordot(right, solved, ([0, 2], [0, 2]))
-        size = len(jacobian)
-        normal = weighted @ jacobian.T
-        return cls(
-            normal[:size] - cross[:size, :size],
-            normal[size] - cross[size, :size],
-            solved[:, size].T,
-            np.moveaxis(solved[:, :size], 2, 0),
-            variance,
-        )
+    def of(cls, strips: Strips, rows: Array, data: Array, weights: Array, spread: Array) -> Eliminated:
+        """From Jacobian rows `[R, N]`, data and weights `[N]`; `spread` `[2 or 3]`: prior sigmas of the strips' own.
 
-
-def _strip_equations(strips: Strips, weighted: Array, weights: Array, spread: Array) -> tuple[Array, Array, Array]:
-    """Sums of weighted columns `[2, P, S]`, the same solved for level and slope, and those' variances `[S, 2]`.
-
-    With odds of their own strips have three of all.
-    """
-    if strips.odds is not None:
-        own = np.stack([np.ones_like(strips.offset), strips.offset, strips.odds])
-        system = strips.sums(own * (weights * own)[:, None]).transpose(2, 0, 1) + np.diag(spread**-2)
-        right = np.stack([strips.sums(weighted * column) for column in own])
-        covariance = np.linalg.inv(system)
-        solved = np.einsum("sij,jps->ips", covariance, right)
-        return right, solved, np.einsum("sii->si", covariance)
-    wo = weights * strips.offset
-    a, b, d = strips.sums(np.stack([weights, wo, wo * strips.offset]))
-    a, d = a + spread[0] ** -2, d + spread[1] ** -2
-    det = a * d - b * b
-    right = np.stack([strips.sums(weighted), strips.sums(weighted * strips.offset)])
-    solved = np.stack([d * right[0] - b * right[1], a * right[1] - b * right[0]]) / det
-    return right, solved, np.stack([d, a], axis=1) / det[:, None]
+        Behind the rows' parameters are those of `Moments`: the level, and what varies slowly.
+        """
+        moments = Moments.of(strips, rows, data, weights)
+        own, variance = moments.solved(spread)
+        size = own.shape[1] - 1
+        cross = np.tensordot(moments.right, own[:, :size], ([0, 2], [0, 2]))
+        left = moments.total() - cross
+        return cls(left[:size], left[size], own, variance)
 
 
 def strip_scores(
-    strips: Strips, jacobian: Array, residual: Array, weights: Array, levels: Array, spread: Array
+    strips: Strips, rows: Array, residual: Array, weights: Array, levels: Array, spread: Array
 ) -> tuple[Array, Array]:
-    """Each strip's own gradient `[S, P]` and information `[S, P, P]`, its level, slope and odds eliminated.
+    """Each strip's own gradient `[P, S]` and information `[P, P, S]`, its level, slope and odds eliminated.
 
-    `levels` `[S, 2 or 3]` are how far those are off their prior's mean.
+    The parameters are those of `Eliminated.of`; `levels` `[S, 2 or 3]` are how far those are off their prior's mean.
     """
-    weighted = np.concatenate([jacobian, (residual + strips.log_albedo(levels))[None]]) * weights
-    right, solved, _ = _strip_equations(strips, weighted, weights, spread)
-    size = len(jacobian)
-    gradient = strips.sums(jacobian * weighted[size]) - np.einsum("cps,cs->ps", right[:, :size], solved[:, size])
-    squares = np.stack([strips.sums(jacobian * row) for row in weighted[:size]])
-    information = squares - np.einsum("cps,cqs->pqs", right[:, :size], solved[:, :size])
-    return gradient.T, np.moveaxis(information, 2, 0)
+    data = residual + np.einsum("kn,kn->n", strips.own, levels.T[:, strips.index])
+    moments = Moments.of(strips, rows, data, weights)
+    own, _ = moments.solved(spread)
+    left = moments.each() - np.einsum("kas,kbs->abs", moments.right, own[:, :-1])
+    return left[-1], left[:-1]
+
+
+def of_shared(parts: Array, reduced: Array) -> Array:
+    """The strips' informations `[S, size, size]` from those of all parameters `[P, P, S]`, `reduced` `[size, P]`."""
+    left = (reduced @ parts.reshape(len(parts), -1)).reshape(len(reduced), *parts.shape[1:])
+    return np.ascontiguousarray((reduced @ left).transpose(2, 0, 1))
 
 
 def score_covariance(strips: Strips, scores: Array, parts: Array) -> Array:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -9,7 +11,7 @@ from conespot.localize.model.estimate import Estimate
 from conespot.localize.model.forward import rotation_basis
 from conespot.localize.model.knowns import Knowns
 from conespot.localize.model.prior import prior_rows
-from conespot.localize.model.sight import look
+from conespot.localize.model.sight import Sight, look
 from conespot.localize.model.solve import Problem, Solution, minimize
 from conespot.scene.pose import Pose
 from conespot.scene.scene import Scene
@@ -26,25 +28,41 @@ def distances(pixels: Array, spots: NDArray[np.intp], estimate: Estimate) -> tup
     Also their derivatives by the pose `[N, 5 or 6]` and by the half angle `[N]`. The distance is the residual angle
     off the cone over that angle's gradient across the image: exact on the outline and to first order beside it.
     """
+    off = Off.of(look(estimate.scene, pixels), spots, estimate)
     pose = estimate.pose
-    sight = look(estimate.scene, pixels)
     each = spotlight_axes(pose, estimate.scene.spotlights)
-    axes = each[spots]
-    to = sight.points - pose.apex
-    d = np.linalg.norm(to, axis=1)
-    to = to / d[:, None]
-    c = np.einsum("ij,ij->i", to, axes)
-    aside = axes - c[:, None] * to
-    s = np.maximum(np.linalg.norm(aside, axis=1), 1e-12)
-    # the arc tangent keeps full precision where the arc cosine loses half the digits
-    residual = np.arctan2(s, c) - estimate.scene.beam.half_angle
-    across = -aside / (d * s)[:, None]  # gradient of the angle over the surface point
-    gx, gy = (np.einsum("ij,ij->i", across, along) for along in (sight.along_x, sight.along_y))
-    slope = np.hypot(gx, gy)
     basis = rotation_basis(pose.axis)[: estimate.pose_size - 3]
-    turns = [-np.einsum("ij,ij->i", to, np.cross(vector, each)[spots]) / s for vector in basis]
-    jacobian = np.column_stack([-across, *turns]) / slope[:, None]
-    return residual / slope, jacobian, -1.0 / slope
+    turns = [-np.einsum("ij,ij->i", off.to, np.cross(vector, each)[spots]) / off.sine for vector in basis]
+    jacobian = np.column_stack([-off.across, *turns]) / off.slope[:, None]
+    return off.distance, jacobian, -1.0 / off.slope
+
+
+@dataclass(frozen=True, eq=False)
+class Off:
+    """How far off the cones of their spots N pixels are."""
+
+    distance: Array  #: from the outline `[N]` [pixels of the sight], positive outside
+    to: Array  #: unit vectors from the tip to what they see `[N, 3]`
+    sine: Array  #: of the angle off the axis `[N]`
+    across: Array  #: gradient of that angle over what they see `[N, 3]` [1/mm]
+    slope: Array  #: and over the image `[N]` [1/pixel]
+
+    @classmethod
+    def of(cls, sight: Sight, spots: NDArray[np.intp], estimate: Estimate) -> Off:
+        """From what the pixels see, whose outlines are those of their `spots` `[N]`."""
+        axes = spotlight_axes(estimate.pose, estimate.scene.spotlights)[spots]
+        to = sight.points - estimate.pose.apex
+        d = np.linalg.norm(to, axis=1)
+        to = to / d[:, None]
+        c = np.einsum("ij,ij->i", to, axes)
+        aside = axes - c[:, None] * to
+        s = np.maximum(np.linalg.norm(aside, axis=1), 1e-12)
+        # the arc tangent keeps full precision where the arc cosine loses half the digits
+        residual = np.arctan2(s, c) - estimate.scene.beam.half_angle
+        across = -aside / (d * s)[:, None]
+        gx, gy = (np.einsum("ij,ij->i", across, along) for along in (sight.along_x, sight.along_y))
+        slope = np.hypot(gx, gy)
+        return cls(residual / slope, to, s, across, slope)
 
 
 def outline_problem(

@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, lru_cache
 from typing import assert_never
 
 import numpy as np
@@ -29,21 +29,22 @@ class Profile:
     cosine: bool  #: whether w is the cosine; otherwise minus the angle [rad]
     half_angle: float  #: [rad]
 
-    @classmethod
-    def of(cls, beam: Beam) -> Profile:
-        """The profile of a beam."""
+    @staticmethod
+    @lru_cache(maxsize=16)
+    def of(beam: Beam) -> Profile:
+        """The profile of a beam: one for all steps of a fit, with its antiderivatives."""
         match beam:
             case HardBeam():
-                return cls(np.array([math.cos(beam.half_angle)]), np.array([[1.0]]), True, beam.half_angle)
+                return Profile(np.array([math.cos(beam.half_angle)]), np.array([[1.0]]), True, beam.half_angle)
             case CyclesBeam():
                 low = math.cos(beam.half_angle)
                 ramp = beam.blend * (1.0 - low)
                 pieces = np.array([[0.0, 0.0, 3.0 / ramp**2, -2.0 / ramp**3], [1.0, 0.0, 0.0, 0.0]])
-                return cls(np.array([low, low + ramp]), pieces, True, beam.half_angle)
+                return Profile(np.array([low, low + ramp]), pieces, True, beam.half_angle)
             case LinearBeam():
-                return cls._broken_line([beam.beam_width, beam.half_angle], [1.0, 0.0])
+                return Profile._broken_line([beam.beam_width, beam.half_angle], [1.0, 0.0])
             case TabulatedBeam():
-                return cls._broken_line(beam.angles, beam.intensities)
+                return Profile._broken_line(beam.angles, beam.intensities)
             case unknown:
                 assert_never(unknown)
 

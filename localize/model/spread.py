@@ -104,6 +104,12 @@ class Spread:
             isinstance(scene.motion, Smeared),
         )
 
+    @staticmethod
+    def in_scene(scene: Scene) -> bool:
+        """Whether a scene has any, but that on the wall."""
+        sharp = scene.camera.pupil == 0.0 and not np.any(way_covariance(scene))
+        return not sharp or lens_variance(scene) > 0.0 or scene.beam.source_diameter > 0.0
+
     @property
     def is_none(self) -> bool:
         """Whether all is sharp."""

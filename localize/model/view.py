@@ -110,12 +110,14 @@ def _inside(pixels: Array, scene: Scene) -> NDArray[np.bool_]:
 def edge_width(estimate: Estimate) -> float:
     """Standard deviation of what spreads the image across the outlines that the frame shows, in the mean [px]."""
     scene, squares = estimate.scene, []
+    if not Spread.in_scene(scene):
+        return 0.0
     for spotlight, axis in enumerate(spotlight_axes(estimate.pose, scene.spotlights)):
         pixels = outline(estimate, spotlight)
         pixels = pixels[_inside(pixels, scene)]
         sight = look(scene, pixels)
         spread = Spread.of(scene, sight, estimate.pose)
-        if spread.is_none or not len(pixels):
+        if not len(pixels):
             continue
         to = sight.points - estimate.pose.apex
         d = np.linalg.norm(to, axis=1)
@@ -157,6 +159,16 @@ class Shown:
             plane = at.binned(np.ascontiguousarray(signal[..., c]))
             found.append(cls(plane, share == 0.0, share == 1.0, nothing, nothing))
         return found
+
+    @classmethod
+    def in_cells(cls, frame: Frame, at: Window, row: NDArray[np.intp], column: NDArray[np.intp]) -> list[Shown]:
+        """The same in some of the window's bins `[N]`; where those are pixels no others are looked at."""
+        if at.side > 1:
+            return [plane.at(row, column) for plane in cls.each(frame, at)]
+        signal, clip = frame.at(at.row + row, at.column + column)
+        nothing = np.zeros(len(row))
+        planes = zip(signal.T.astype(float), clip.T, strict=True)
+        return [cls(plane, ~clipped, clipped, nothing, nothing) for plane, clipped in planes]
 
     def told(self, log_albedo: Array, variance: Array) -> Shown:
         """The same where something else tells the log albedo of each bin, and its variance."""

@@ -167,4 +167,5 @@ def ring_kernels(size: int, radii: tuple[float, ...]) -> NDArray[np.complex64]:
 def _one_channel(frame: Frame, step: int) -> Signal:
     """Light in a frame's brightest channel, every `step`-th pixel."""
     every = slice(step // 2, None, step)
-    return np.ascontiguousarray(frame.light(every, every)[0].max(axis=2), np.float32)
+    signal = frame.signal(every, every)
+    return signal[..., 0] if signal.shape[2] == 1 else signal.max(axis=2)
