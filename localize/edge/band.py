@@ -11,6 +11,7 @@ import math
 from collections.abc import Sequence
 from copy import copy
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -58,8 +59,7 @@ class Stage:
 class BandFit(EdgeFit):
     """A fitted band."""
 
-    channels: tuple[Nuisances, ...]
-    contradicted: bool  #: whether the band shows what was taken as told to be otherwise
+    channels: tuple[Nuisances, ...]  #: before the last step
     seen: Seen
 
     @property
@@ -96,6 +96,21 @@ class BandFit(EdgeFit):
                 gradient += sign * reduced @ part.gradient
         return information, gradient
 
+    @cached_property
+    def there(self) -> tuple[Nuisances, ...]:
+        """The channels where the fit stands, evaluated after its last step; those of the fit stay as they are."""
+        lights, channels = self.seen.lights(self.estimate, self.knowns.doubting), tuple(map(copy, self.channels))
+        for c, channel in enumerate(channels):
+            channel.evaluate(self.seen.irradiance, *lights[c], lights.odds[c] if lights.odds else None)
+        return channels
+
+    def contradicts(self, doubted: Knowns, nominal: Scene) -> bool:
+        """Whether the band shows that to be otherwise than `nominal` which `doubted` leave free beside its knowns."""
+        lights, prior = self.seen.lights(self.estimate, doubted), prior_rows(self.estimate, nominal, doubted)
+        channels = [channel.along(lights[c][1]) for c, channel in enumerate(self.there)]
+        information, gradient, _ = _equations(channels, prior)
+        return contradicted(information, gradient, self.estimate, doubted, self.knowns)
+
     def suspicions(self, nominal: Scene) -> dict[str, float]:
         """Scores of beam and wall where the fit stands, over their sigmas."""
         knowns, pose_size = self.knowns, self.estimate.pose_size
@@ -111,14 +126,14 @@ class BandFit(EdgeFit):
         told += ["edge"] * len(also)
         by_blur = [rows[at["blur"]] for _, rows in lights.each]
         others, by_others = self.seen.doubts(self.channels, lights, by_blur, nominal)
-        shed = [(*lights[c], more) for c, more in enumerate(by_others)]
-        each = tuple((light, np.concatenate([rows[first], *also, more])) for light, rows, more in shed)
-        channels = [copy(channel) for channel in self.channels]
+        channels = [
+            channel.along(np.concatenate([lights[c][1][first], *also, more]))
+            for c, (channel, more) in enumerate(zip(self.there, by_others, strict=True))
+        ]
         pull, prior = prior_rows(self.estimate, nominal, knowns)
         prior = np.pad(prior, ((0, 0), (0, len(told) + len(others))))
         # where a prior pulls, the slope of what bins say is not zero at the minimum: both together are
-        wider = Lights(each, lights.odds)
-        information, gradient, _ = _equations(channels, self.seen.irradiance, wider, (pull, prior))
+        information, gradient, _ = _equations(channels, (pull, prior))
         size = len(own)
         beam, last = np.arange(size + len(told)), np.r_[:size, size + len(told) : len(gradient)]
         found = self._scores(told, channels, prior, gradient, information, beam)
@@ -175,13 +190,11 @@ def fit_band(
     *,
     stage: Stage,
     tied: bool = False,
-    doubted: Knowns | None = None,
 ) -> BandFit | LocalizationFailure:
     """Fit the pose to the bins of a stage.
 
     Gain and spreads of the albedo start from those of the fit `before`, or from the band itself and a usual retina.
-    With `tied` the axis stays on the RCM. A `reference` tells the albedo as far as it shows it. What is `doubted`
-    leaves more free than `knowns` do: whether the band contradicts them is asked at the end.
+    With `tied` the axis stays on the RCM. A `reference` tells the albedo as far as it shows it.
     """
     nominal, estimate, side = start.scene, start, stage.side
     size = start.pose_size + len(knowns.free)
@@ -214,7 +227,9 @@ def fit_band(
         if turn:
             lights = shed(estimate)
         pr, pj = prior_rows(estimate, nominal, used)
-        information, gradient, parts = _equations(channels, irradiance, lights, (pr, pj))
+        for c, channel in enumerate(channels):
+            channel.evaluate(irradiance, *lights[c], lights.odds[c] if lights.odds else None)
+        information, gradient, parts = _equations(channels, (pr, pj))
         found = _within_bounds(information, gradient, estimate, knowns)
         if found is None:
             return LocalizationFailure(UNCERTAIN)
@@ -225,17 +240,8 @@ def fit_band(
         length = float(step @ information @ step)
         if length < stage.enough**2 and turn >= 2:
             break
-    doubt = False
-    if doubted is not None:
-        free = replace(doubted, rcm_sigma_mm=used.rcm_sigma_mm)
-        # the channels stay as they are
-        again, prior = [copy(channel) for channel in channels], prior_rows(estimate, nominal, free)
-        own, pull, _ = _equations(again, irradiance, shed(estimate, free), prior)
-        doubt = contradicted(own, pull, estimate, free, knowns)
-    return BandFit(
-        estimate, information, pj, step, band.covered, knowns, tuple(channels), doubt,
-        Seen(sight, band.pixels, side, irradiance),
-    )  # fmt: skip
+    seen = Seen(sight, band.pixels, side, irradiance, shed)
+    return BandFit(estimate, information, pj, step, band.covered, knowns, tuple(channels), seen)
 
 
 def _within_bounds(information: Array, gradient: Array, at: Estimate, knowns: Knowns) -> Array | None:
@@ -255,18 +261,15 @@ def _within_bounds(information: Array, gradient: Array, at: Estimate, knowns: Kn
     return step
 
 
-def _equations(
-    channels: Sequence[Nuisances], irradiance: Array, lights: Lights, prior: tuple[Array, Array]
-) -> tuple[Array, Array, list[Eliminated]]:
+def _equations(channels: Sequence[Nuisances], prior: tuple[Array, Array]) -> tuple[Array, Array, list[Eliminated]]:
     """Information `[P, P]` and gradient `[P]` of what the channels share, and each with its own still in it.
 
-    They are lit by the ambient irradiance `[N]` and the spotlights'; the `prior` are residuals and rows.
+    The channels are as they were evaluated; the `prior` are residuals and rows.
     """
     pr, pj = prior
     information, gradient = pj.T @ pj, -pj.T @ pr
     size, parts = len(gradient), []
-    for c, channel in enumerate(channels):
-        channel.evaluate(irradiance, *lights[c], lights.odds[c] if lights.odds else None)
+    for channel in channels:
         part = channel.eliminated(size)
         reduced = reduction(part.information, size)
         parts.append(part)

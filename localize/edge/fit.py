@@ -118,16 +118,15 @@ def _bands(
     for number, level in enumerate(patch.levels):
         last = number + 1 == len(patch.levels)
         while True:
-            found = fit_band(
-                frame, start, fit, used, noise, reference,
-                stage=_stage(level, patch, edge_width(start), last=last),
-                tied=number == 0 and len(patch.levels) > 1, doubted=doubting if used != doubting else None,
-            )  # fmt: skip
+            tied = number == 0 and len(patch.levels) > 1
+            stage = _stage(level, patch, edge_width(start), last=last)
+            found = fit_band(frame, start, fit, used, noise, reference, stage=stage, tied=tied)
             if isinstance(found, LocalizationFailure):
                 # what starts inside the frame and leaves it has run off
                 return LocalizationFailure(UNCERTAIN) if number else found
-            fit, start = found, found.estimate
-            if not found.contradicted:
+            nominal, fit, start = start.scene, found, found.estimate
+            more = replace(doubting, rcm_sigma_mm=0.0) if tied else doubting
+            if used == doubting or not found.contradicts(more, nominal):
                 break
             # one width tells that something spreads the image, two what it is
             used = doubting = doubting.doubting_core if patch.sharp and not compressed else doubting

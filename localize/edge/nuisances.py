@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from copy import copy
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -80,10 +81,16 @@ class Nuisances:
             residual[over], worth[over] = censored(beyond, np.sqrt(variance[over]))
             whitened = residual / np.sqrt(variance)
         self.weights = worth / variance * student_weights(whitened)
-        share = g / incident
+        self._share = share = g / incident
         self.rows = np.concatenate([share * rows, (share * light)[None]])
         self.residual = residual
         self.follows = follows(self.weights * np.square(self.rows[-1]), whitened)
+
+    def along(self, rows: Array) -> Nuisances:
+        """The same as it was evaluated, with the light's derivatives `rows` `[P, N]` by other shared parameters."""
+        other = copy(self)
+        other.rows = np.concatenate([self._share * rows, self.rows[-1:]])
+        return other
 
     def _begin(self, brightness: Array) -> None:
         """Take what bins show over the model's brightness `[N]` for the albedo."""
@@ -106,8 +113,8 @@ class Nuisances:
     def eliminated(self, size: int, profile: float | None = None) -> Eliminated:
         """The normal equations of `size` shared parameters, gain, level and slow slopes, the strips' own eliminated.
 
-        With a `profile` the mean log light at each whole distance from the outlines joins them behind the gain, so far not
-        known [1].
+        With a `profile` the mean log light at each whole distance from the outlines, so far not known [1], joins them
+        behind the gain.
         """
         data = self.residual + self.strips.log_albedo(self.levels, np.zeros_like(self.slow))
         rows, precision = self.rows, self.precision

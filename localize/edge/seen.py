@@ -26,17 +26,13 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True, eq=False)
 class Seen:
-    """What a band's bins of `side` px at `pixels` `[N, 2]` see, and the ambient `irradiance` there `[N]`."""
+    """What a band's bins of `side` px at `pixels` `[N, 2]` see, and the light there."""
 
     sight: Sight
     pixels: Array
     side: int
-    irradiance: Array
-
-    def lights(self, estimate: Estimate, knowns: Knowns) -> Lights:
-        """The spotlights' irradiance, with derivatives by what is free."""
-        every = np.ones(len(self.pixels), bool)
-        return Irradiance(self.sight, self.pixels, self.side, estimate, knowns, every)(estimate)
+    irradiance: Array  #: ambient `[N]`
+    lights: Irradiance  #: of the spotlights
 
     def softer(self, estimate: Estimate, hard: Array) -> Array | None:
         """How the irradiance `hard` `[N]` changes as the edge gets soft; None of others, which have a softness."""
@@ -45,7 +41,9 @@ class Seen:
             return None
         soft = CyclesBeam(half_angle=beam.half_angle, blend=EDGE.softer)
         there = Estimate(estimate.pose, estimate.scene.model_copy(update={"beam": soft}))
-        softened = self.lights(there, Knowns().within(there.scene))[0][0]
+        every = np.ones(len(self.pixels), bool)
+        soften = Irradiance(self.sight, self.pixels, self.side, there, Knowns().within(there.scene), every)
+        softened = soften(there)[0][0]
         return np.asarray((softened - hard) / EDGE.softer)
 
     def doubts(

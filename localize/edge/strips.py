@@ -40,7 +40,7 @@ class Strips:
 
     @cached_property
     def own(self) -> Array:
-        """What a strip's own quantities, level, slope and odds if it has any, do to its bins' log light `[2 or 3, N]`."""
+        """What a strip's own level, slope and odds, if it has any, do to the log light of its bins `[2 or 3, N]`."""
         return np.stack([np.ones_like(self.offset), self.offset, *([] if self.odds is None else [self.odds])])
 
     @cached_property
@@ -89,7 +89,7 @@ class Strips:
         return float(np.sqrt(np.mean(found)))
 
     def log_albedo(self, levels: Array, slow: Array) -> Array:
-        """What the strips' own `[S, 2 or 3]`, level, slope and odds, and `slow` ones `[Q]` do to each bin's log light."""
+        """What levels, slopes and odds, strips' own `[S, 2 or 3]` and `slow` ones `[Q]`, do to the log light `[N]`."""
         kinds, amounts = self.slow
         own = levels.copy()
         for kind in range(own.shape[1]):
@@ -106,10 +106,9 @@ def _harmonics(count: int) -> Array:
 
 @dataclass(frozen=True)
 class Moments:
-    """Sums over the strips of weighted products of columns, of which there are rows of a Jacobian, the same level of all
-    strips, what varies slowly, and the data.
+    """Sums over the strips of weighted products of columns: rows of a Jacobian, a level, what varies slowly, and data.
 
-    Only rows and data are looked at bin by bin: within a strip all else is one of its own quantities.
+    Rows and data alone are looked at bin by bin: within a strip, all else is one of its own quantities.
     """
 
     strips: Strips

@@ -15,6 +15,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -86,67 +87,115 @@ def light(
     one for each of the `widenings`: the scene with a wider spread of the image, and how much wider. Where light spreads
     on the wall as well, by a Gaussian of the variance `wall` [mm^2], the last row is that one's.
     """
-    axes = spotlight_axes(pose, scene.spotlights)
-    basis = rotation_basis(pose.axis)[: pose_size - 3]
-    to = sight.points - pose.apex
-    d2 = np.einsum("ij,ij->i", to, to)
-    d = np.sqrt(d2)
-    to /= d[:, None]
-    cosine = -np.einsum("ij,ij->i", sight.normals, to)
-    f = np.maximum(cosine, 0.0) / d2
-    falloff = (sight.normals / d2[:, None] + 3.0 * (cosine / d2)[:, None] * to) / d[:, None]
-    spread = Spread.of(scene, sight, pose, wall)
-    wider = [(Spread.of(blurrier, sight, pose, wall), step) for blurrier, step in widenings]
+    cones = Cones(sight, pose, scene, profile, pose_size=pose_size, wall=wall)
+    rows = [cones.by_beam(*change) for change in changes] + [cones.by_spread(*wider) for wider in widenings]
     if wall > 0.0:
-        wider.append((Spread.of(scene, sight, pose, 2.0 * wall), wall))
-    own = 3 + len(basis)
-    total, rows = np.zeros(len(d)), np.zeros((own + len(changes) + len(wider), len(d)))
-    mixed = np.zeros(len(d))  # light that a spread brings where it falls off across the edge
-    for axis in axes:
-        rise = Rise.of(sight, axis, to, d, profile)
-        average = _averaging(rise, spread, profile, scene.eye.radius, curved=bool(wider))
+        rows.append(cones.by_spread(scene, wall, 2.0 * wall))
+    return Light(cones.value, np.stack([*cones.rows, *rows]))
+
+
+class Cones:
+    """The cones of a pose on what a sight sees: their light, and its derivatives as one after the other is asked for."""
+
+    value: Array  #: of `Light` `[N]`
+    rows: Array  #: its derivatives by the pose `[5 or 6, N]`
+
+    def __init__(
+        self, sight: Sight, pose: Pose, scene: Scene, profile: Profile, *, pose_size: int = 5, wall: float = 0.0
+    ) -> None:
+        """As `light` takes them."""
+        self._sight, self._pose, self._wall = sight, pose, wall
+        radius = scene.eye.radius
+        basis = rotation_basis(pose.axis)[: pose_size - 3]
+        to = sight.points - pose.apex
+        d2 = np.einsum("ij,ij->i", to, to)
+        d = np.sqrt(d2)
+        to /= d[:, None]
+        cosine = -np.einsum("ij,ij->i", sight.normals, to)
+        self._f = f = np.maximum(cosine, 0.0) / d2
+        falloff = (sight.normals / d2[:, None] + 3.0 * (cosine / d2)[:, None] * to) / d[:, None]
+        self._spread = spread = Spread.of(scene, sight, pose, wall)
+        total, rows = np.zeros(len(d)), np.zeros((3 + len(basis), len(d)))
+        mixed = np.zeros(len(d))  # light that a spread brings where it falls off across the edge
+        self._each = []
+        for axis in spotlight_axes(pose, scene.spotlights):
+            cone = _Cone.of(Rise.of(sight, axis, to, d, profile), spread, profile, radius)
+            self._each.append(cone)
+            rise, here = cone.rise, cone.here
+            total += here.mean
+            slope = here.slope * rise.stretch
+            if not spread.is_none:
+                mixed += slope * spread.covariance(rise, falloff, radius)
+            slope = slope * f
+            rows[:3] -= slope * rise.across.T
+            for j, vector in enumerate(basis):
+                rows[3 + j] += slope * (to @ _cross(vector, axis))
+        lit = cosine > 0.0
+        rows[:3] += np.where(lit, total, 0.0) * falloff.T
+        self.rows = rows
+        self.value = total * f if spread.is_none else total * f + np.where(lit, mixed, 0.0)
+
+    def by_beam(self, wide: Profile, narrow: Profile, between: float) -> Array:
+        """The light's derivative `[N]` by what makes the profile the one or the other, `between` which lies so much."""
+        off = sum(cone.average(wide).mean - cone.average(narrow).mean for cone in self._each)
+        return np.asarray(self._f * off / between)
+
+    def by_spread(self, wider: Scene, step: float, wall: float | None = None) -> Array:
+        """The light's derivative `[N]` by what makes the image's spread that of another scene, or on the `wall`.
+
+        A spread wider by a variance adds that much of half the second derivative: the heat equation.
+        """
+        more = Spread.of(wider, self._sight, self._pose, self._wall if wall is None else wall)
+        found = np.zeros(len(self._f))
+        for cone in self._each:
+            found += cone.bend * (more.widths(cone.rise).variance - cone.variance)
+        return np.asarray(self._f * found / step)
+
+
+@dataclass(frozen=True, eq=False)
+class _Cone:
+    """One of them, averaged over pixels and what spreads the image."""
+
+    rise: Rise
+    here: Smooth
+    average: Callable[[Profile], Smooth]  #: of any profile in the beam's place
+    curved: Callable[[], Array]  #: second derivative of the mean by the variable `[N]`, which hardly anybody asks for
+    spread: Spread
+
+    @classmethod
+    def of(cls, rise: Rise, spread: Spread, profile: Profile, radius: float) -> _Cone:
+        """Of a beam's profile, on a wall of that radius."""
+        px, py = rise.halves
+        if spread.is_none:
+            sharp, nothing = rise.on_pixels(profile, radius), np.zeros(0)
+            here = Smooth(*profile.mean(sharp, px, py), nothing, nothing)
+
+            def mean(of: Profile) -> Smooth:
+                return Smooth(*of.mean(sharp, px, py), nothing, nothing)
+
+            return cls(rise, here, mean, lambda: profile.curvature(sharp, px, py), spread)
+        widths = spread.widths(rise)
+        w, skew = spread.bent(rise, widths, profile, radius)
+        # of what is sought, less than a pixel's own variance
+        least = (np.square(rise.gx) + np.square(rise.gy)) / 12.0 if spread.sought else 0.0
+        over = widths.average(least, rise.stretch)
+
+        def average(of: Profile) -> Smooth:
+            found = over(of, w, px, py)
+            return replace(found, mean=found.mean + skew * rise.stretch**3 * found.third)
+
         here = average(profile)
-        total += here.mean
-        slope = here.slope * rise.stretch
-        if not spread.is_none:
-            mixed += slope * spread.covariance(rise, falloff, scene.eye.radius)
-        slope = slope * f
-        rows[:3] -= slope * rise.across.T
-        for j, vector in enumerate(basis):
-            rows[3 + j] += slope * (to @ _cross(vector, axis))
-        for j, (wide, narrow, between) in enumerate(changes, start=own):
-            rows[j] += f * (average(wide).mean - average(narrow).mean) / between
-        if wider:
-            curved = f * here.curvature * np.square(rise.stretch) / 2.0
-            now = spread.widths(rise).variance
-        for j, (more, step) in enumerate(wider, start=own + len(changes)):
-            # a spread wider by a variance adds that much of half the second derivative: the heat equation
-            rows[j] += curved * (more.widths(rise).variance - now) / step
-    value = total * f
-    rows[:3] += np.where(cosine > 0.0, total, 0.0) * falloff.T
-    return Light(value if spread.is_none else value + np.where(cosine > 0.0, mixed, 0.0), rows)
+        return cls(rise, here, average, lambda: here.curvature, spread)
 
+    @cached_property
+    def bend(self) -> Array:
+        """Half the second derivative of the mean by the cosine `[N]`."""
+        return np.asarray(self.curved() * np.square(self.rise.stretch) / 2.0)
 
-def _averaging(
-    rise: Rise, spread: Spread, profile: Profile, radius: float, *, curved: bool
-) -> Callable[[Profile], Smooth]:
-    """The mean over a pixel, and over its spread, of any profile in the beam's place; how curved only where asked."""
-    px, py = rise.halves
-    if spread.is_none:
-        sharp = rise.on_pixels(profile, radius)
-        nothing = np.zeros(0)
-        return lambda of: Smooth(*of.mean(sharp, px, py), of.curvature(sharp, px, py) if curved else nothing, nothing)
-    widths = spread.widths(rise)
-    w, skew = spread.bent(rise, widths, profile, radius)
-    # of what is sought, less than a pixel's own variance
-    least = (np.square(rise.gx) + np.square(rise.gy)) / 12.0 if spread.sought else 0.0
-    over = widths.average(least, rise.stretch)
-
-    def average(of: Profile) -> Smooth:
-        found = over(of, w, px, py)
-        return replace(found, mean=found.mean + skew * rise.stretch**3 * found.third)
-
-    return average
+    @cached_property
+    def variance(self) -> Array:
+        """What spreads the image, along the cosine `[N]`."""
+        return self.spread.widths(self.rise).variance
 
 
 def _cross(a: Array, b: Array) -> Array:

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from conespot.localize.model.deep import Deep
 from conespot.localize.model.estimate import Estimate
-from conespot.localize.model.forward import Light, light, light_by_surface
+from conespot.localize.model.forward import Cones, Light, light_by_surface
 from conespot.localize.model.glow import DeepLight, Glow
 from conespot.localize.model.knowns import Knowns
 from conespot.localize.model.quantity import Quantity
@@ -41,16 +41,25 @@ class Irradiance:
 
         Light falls on those that are `lit` `[N]` alone.
         """
-        self._sight, self._pixels, self._side, self._knowns = sight, pixels, side, knowns
+        self._sight, self._pixels, self._side, self._knowns, self._near = sight, pixels, side, knowns, near.scene
         self._lit = np.flatnonzero(lit)
         self._there = sight if lit.all() else sight.part(self._lit)
         deep = Deep.of(near.scene)
         self._glow = None if deep is None else Glow(near, sight, side * near.scene.camera.pixel_pitch)
+        # what was asked of an estimate last: more derivatives of the same one may follow
+        self._found: tuple[Estimate, tuple[Quantity, ...], Lights] | None = None
+        self._last: tuple[Estimate, Sight, Cones] | None = None
 
     def __call__(self, estimate: Estimate, knowns: Knowns | None = None) -> Lights:
         """The irradiance where a fit stands, with derivatives by all that its own or other `knowns` leave free."""
-        lit, free = self._lit, (knowns or self._knowns).free
-        local = spotlight_irradiance(self._there, estimate, free, self._pixels[lit], self._side)
+        free = (knowns or self._knowns).free
+        if self._found is None or self._found[0] is not estimate or self._found[1] != free:
+            self._found = estimate, free, self._lights(estimate, free)
+        return self._found[2]
+
+    def _lights(self, estimate: Estimate, free: tuple[Quantity, ...]) -> Lights:
+        lit = self._lit
+        local = self._local(estimate, free)
         if self._glow is None:
             return Lights((local,))
         if len(lit) < len(self._pixels):
@@ -67,6 +76,35 @@ class Irradiance:
         odds = [share * (1.0 - share) * (light.value - local[0]) for share, light in zip(shares, lights, strict=True)]
         each = zip(lights, shares, odds, strict=True)
         return Lights(tuple(self._mixed(local, *one, estimate, free) for one in each), tuple(odds))
+
+    def _local(self, estimate: Estimate, free: tuple[Quantity, ...]) -> tuple[Array, Array]:
+        """The irradiance that falls on lit bins `[M]` and its derivatives by pose, beam, spread and what is seen."""
+        moving = [each for each in free if each.changes == "sight"]
+        seen, cones = self._cones(estimate)
+        rows = [cones.by_beam(*change) for change in estimate.beam_changes(free)]
+        rows += [cones.by_spread(*wider) for wider in estimate.wider(free)]
+        here = Light(cones.value, np.stack([*cones.rows, *rows]))
+        if not moving:
+            return here.value, here.jacobian
+        by_sight = [
+            light_by_surface(
+                here, seen, estimate.pose, _sides(estimate, each, self._pixels[self._lit], self._side), each.step
+            )
+            for each in moving
+        ]
+        # and the iris before some of the bins
+        return np.nan_to_num(here.value), np.nan_to_num(np.stack([*here.jacobian, *by_sight]))
+
+    def _cones(self, estimate: Estimate) -> tuple[Sight, Cones]:
+        """What lit bins see, and the cones there: those of the last estimate once more, if it is that one."""
+        if self._last is None or self._last[0] is not estimate:
+            scene, near = estimate.scene, self._near
+            still = scene.camera is near.camera and scene.eye is near.eye and scene.surface is near.surface
+            moved = not still and any(each.changes == "sight" for each in self._knowns.free)
+            seen = look(scene, self._pixels[self._lit], self._side) if moved else self._there
+            cones = Cones(seen, estimate.pose, scene, estimate.profile, pose_size=estimate.pose_size)
+            self._last = estimate, seen, cones
+        return self._last[1:]
 
     def _mixed(
         self,
@@ -94,26 +132,3 @@ def _sides(estimate: Estimate, quantity: Quantity, pixels: Array, side: int) -> 
     """What bins see with a little more of a quantity, and a little less."""
     more, less = (look(estimate.beside(quantity, step), pixels, side) for step in (quantity.step, -quantity.step))
     return more, less
-
-
-def spotlight_irradiance(
-    sight: Sight, estimate: Estimate, free: tuple[Quantity, ...], pixels: Array, side: int
-) -> tuple[Array, Array]:
-    """The irradiance that falls on bins `[N]` and its derivatives by pose, beam, spread and what bins see `[P, N]`.
-
-    `sight` is what the bins of `side` px at `pixels` `[N, 2]` see of the nominal surface.
-    """
-    moving = [each for each in free if each.changes == "sight"]
-    seen = look(estimate.scene, pixels, side) if moving else sight
-    here = light(
-        seen, estimate.pose, estimate.scene, estimate.profile,
-        pose_size=estimate.pose_size, changes=estimate.beam_changes(free), widenings=estimate.wider(free),
-    )  # fmt: skip
-    if not moving:
-        return here.value, here.jacobian
-    rows = [here.jacobian]
-    for each in moving:
-        sides = _sides(estimate, each, pixels, side)
-        rows.append(light_by_surface(here, seen, estimate.pose, sides, each.step)[None])
-    # and the iris before some of the bins
-    return np.nan_to_num(here.value), np.nan_to_num(np.concatenate(rows))
