@@ -95,7 +95,7 @@ def light(
 
 
 class Cones:
-    """The cones of a pose on what a sight sees: their light, and its derivatives as one after the other is asked for."""
+    """The cones of a pose on what a sight sees: their light, and derivatives of it as one after the other is asked."""
 
     value: Array  #: of `Light` `[N]`
     rows: Array  #: its derivatives by the pose `[5 or 6, N]`

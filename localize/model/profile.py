@@ -102,12 +102,9 @@ class Profile:
         edge, a, p, q = near[across], a[across], p[across], q[across]
         floor = np.maximum(1e-3 * np.maximum(p, q), 1e-9)
         p, q = np.maximum(p, floor), np.maximum(q, floor)
-        area = 4.0 * p * q
-        corners = (a + p + q, a + p - q, a - p + q, a - p - q)
-        h = [self._piecewise(self._twice, corner) for corner in corners]
-        mean[edge] = (h[0] - h[1] - h[2] + h[3]) / area
-        h = [self._piecewise(self._once, corner) for corner in corners]
-        slope[edge] = (h[0] - h[1] - h[2] + h[3]) / area
+        corners, area = _corners(a, p, q), 4.0 * p * q
+        mean[edge] = _difference(self._piecewise(self._twice, corners)) / area
+        slope[edge] = _difference(self._piecewise(self._once, corners)) / area
         return mean, slope
 
     def curvature(self, w: Array, px: Array, py: Array) -> Array:
@@ -117,9 +114,7 @@ class Profile:
         a, p, q = w[at], px[at], py[at]
         floor = np.maximum(1e-3 * np.maximum(p, q), 1e-9)
         p, q = np.maximum(p, floor), np.maximum(q, floor)
-        corners = (a + p + q, a + p - q, a - p + q, a - p - q)
-        g = [self._piecewise(self.coefficients, corner) for corner in corners]
-        found[at] = (g[0] - g[1] - g[2] + g[3]) / (4.0 * p * q)
+        found[at] = _difference(self._piecewise(self.coefficients, _corners(a, p, q))) / (4.0 * p * q)
         return found
 
     @cached_property
@@ -157,19 +152,29 @@ class Profile:
 
     def _piecewise(self, coefficients: Array, w: Array) -> Array:
         if len(self.knots) == 1:
-            x = np.maximum(w - self.knots[0], 0.0)
-            lit = w >= self.knots[0]
-            return _polynomial(coefficients[0], x) * lit
+            x = w - self.knots[0]
+            return _polynomial(coefficients[0].tolist(), x) * (x >= 0.0)
         piece = np.searchsorted(self.knots, w, side="right") - 1
         x = w - self.knots[np.maximum(piece, 0)]
         return np.where(piece >= 0, _polynomial(np.moveaxis(coefficients[np.maximum(piece, 0)], -1, 0), x), 0.0)
 
 
-def _polynomial(coefficients: Array, x: Array) -> Array:
-    result = np.broadcast_to(coefficients[-1], x.shape)
+def _polynomial(coefficients: Sequence[float] | Array, x: Array) -> Array:
+    result = coefficients[-1]
     for row in coefficients[-2::-1]:
         result = result * x + row
-    return np.asarray(result)
+    return result + np.zeros_like(x) if len(coefficients) == 1 else np.asarray(result)
+
+
+def _corners(w: Array, p: Array, q: Array) -> Array:
+    """The variable at a pixel's corners `[4, N]`."""
+    diagonal, other = p + q, p - q
+    return np.stack([w + diagonal, w + other, w - other, w - diagonal])
+
+
+def _difference(values: Array) -> Array:
+    """The second difference `[N]` of values at the corners `[4, N]`."""
+    return np.asarray(values[0] - values[1] - values[2] + values[3])
 
 
 def _integrate(knots: Array, coefficients: Array) -> Array:

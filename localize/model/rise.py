@@ -69,12 +69,24 @@ class Rise:
         return np.asarray(flat + normal * size / radius)
 
     def in_image(self, at: NDArray[np.intp], radius: float) -> tuple[Array, Array]:
-        """Second derivatives at some pixels by one pixel along the edge and across it, on a surface of that radius."""
-        gx, gy = self.gx[at], self.gy[at]
+        """Second derivatives at some pixels by one pixel along the edge and across it, on a surface of that radius.
+
+        The same as `second` of either step, from its parts by a pixel to the right and one down.
+        """
+        gx, gy, d, c = self.gx[at], self.gy[at], self.d[at], self.c[at]
         length = np.maximum(np.hypot(gx, gy), 1e-300)
-        ex, ey = (gx / length)[:, None], (gy / length)[:, None]
-        x, y = self.sight.along_x[at], self.sight.along_y[at]
-        return self.second(at, -ey * x + ex * y, radius), self.second(at, ex * x + ey * y, radius)
+        ex, ey = gx / length, gy / length
+        x, y, to = self.sight.along_x[at], self.sight.along_y[at], self.to[at]
+        ax, ay = np.einsum("ij,ij->i", to, x) / d, np.einsum("ij,ij->i", to, y) / d
+        xx, xy, yy = np.einsum("ij,ij->i", x, x), np.einsum("ij,ij->i", x, y), np.einsum("ij,ij->i", y, y)
+        flat = np.einsum("ij,ij->i", self.across[at], self.sight.normals[at]) / radius - c / np.square(d)
+        along, across = ex * ay - ey * ax, ex * ax + ey * ay
+        # along the edge the cosine does not rise
+        tangential = c * np.square(along) + flat * (ey * ey * xx - 2.0 * ex * ey * xy + ex * ex * yy)
+        normal = (
+            -2.0 * length * across + c * np.square(across) + flat * (ex * ex * xx + 2.0 * ex * ey * xy + ey * ey * yy)
+        )
+        return tangential, normal
 
     def on_wall(self, at: NDArray[np.intp], radius: float) -> tuple[Array, Array]:
         """The same by one millimetre on the wall."""
@@ -101,8 +113,11 @@ class Rise:
         at = np.flatnonzero(np.abs(self.w - profile.knots[0]) < (1.5 if step else 4.0) * (px + py))
         if not len(at):
             return self.w
-        length = np.hypot(self.gx, self.gy)
-        missing = (profile.knots[0] - self.w) / self.stretch if step else length / math.sqrt(12.0)
-        away = np.clip(missing[at] / np.maximum(length[at], 1e-300), -0.7, 0.7)
+        if step:
+            missing = (profile.knots[0] - self.w[at]) / np.broadcast_to(self.stretch, self.w.shape)[at]
+            length = np.maximum(np.hypot(self.gx[at], self.gy[at]), 1e-300)
+            away: Array | float = np.clip(missing / length, -0.7, 0.7)
+        else:
+            away = math.sqrt(1.0 / 12.0)
         tangential, normal = self.in_image(at, radius)
         return self.raised(at, tangential / 24.0 + normal * away**2 / 2.0)
