@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from conespot.localize.image import Frame, Reference
 from conespot.localize.model.deep import Deep
 from conespot.localize.model.estimate import Estimate
+from conespot.localize.model.residual import median, quantile
 from conespot.localize.model.view import edge_width, outline
 from conespot.scene.retina import Fundus, Spread
 from conespot.scene.scene import Scene
@@ -116,9 +117,9 @@ def halo(frame: Frame, estimate: Estimate, reference: Reference | None, width: f
     for k in range(HALO.sectors):
         rings = [light[shows & ring & (sector == k)] for ring in (near, far)]
         if min(map(len, rings)) >= HALO.pixels:
-            pairs.append([float(np.median(ring)) for ring in rings])
+            pairs.append([median(ring) for ring in rings])
     if len(pairs) < HALO.fewest or not len(patch):
         return None
     close, beyond = np.array(pairs).T
-    own = float(np.quantile(patch, 0.9)) - float(np.median(beyond))
+    own = quantile(patch, 0.9) - median(beyond)
     return float(np.sort(close - beyond)[1]) / max(own, 1e-12), float(np.sort(close / np.maximum(beyond, 1e-12))[1])

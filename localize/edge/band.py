@@ -136,11 +136,12 @@ class BandFit(EdgeFit):
         information, gradient, _ = _equations(channels, (pull, prior))
         size = len(own)
         beam, last = np.arange(size + len(told)), np.r_[:size, size + len(told) : len(gradient)]
-        found = self._scores(told, channels, prior, gradient, information, beam)
-        # they take their time, and hardly ever matter
-        if not matter(others, gradient[last], information[np.ix_(last, last)], size):
-            return found
-        return found | self._scores(others, channels, prior, gradient, information, last)
+        found: dict[str, float] = {}
+        for names, of in ((told, beam), (others, last)):
+            # they take their time, and hardly ever matter
+            if matter(names, gradient[of], information[np.ix_(of, of)], size):
+                found |= self._scores(names, channels, prior, gradient, information, of)
+        return found
 
     def _scores(
         self,

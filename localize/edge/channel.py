@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from conespot.localize.edge.nuisances import Nuisances, first_levels
 from conespot.localize.edge.settings import EDGE
-from conespot.localize.edge.strips import Strips, of_shared, strip_scores
+from conespot.localize.edge.strips import Moments, Strips, of_shared, strip_scores
 from conespot.localize.model.noise import NoiseModel
 from conespot.localize.model.residual import RESIDUAL, follows, incident_light, median, rest, rms
 from conespot.localize.model.view import Shown
@@ -213,9 +213,8 @@ class Channel:
         And the covariance `[size, size]` of what the channel's own priors add to the gradient.
         """
         rows = np.concatenate([self._rows[:size], self._rows[self._size :]])
-        gradient, own = strip_scores(
-            self.strips, rows, self._residual, self._weights, self._levels, np.asarray(self._spread)
-        )
+        moments = Moments.of(self.strips, rows, self._residual, self._weights, self._levels)
+        gradient, own = strip_scores(moments, np.asarray(self._spread))
         whole = own.sum(axis=2)
         mine = np.arange(size, len(whole))
         whole[mine, mine] += self._precision

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from conespot.localize.edge.settings import EDGE
-from conespot.localize.edge.strips import Eliminated, Strips, strip_scores
+from conespot.localize.edge.strips import Eliminated, Moments, Strips, strip_scores
 from conespot.localize.model.noise import NoiseModel
 from conespot.localize.model.residual import (
     censored,
@@ -116,12 +116,12 @@ class Nuisances:
         With a `profile` the mean log light at each whole distance from the outlines, so far not known [1], joins them
         behind the gain.
         """
-        data = self.residual + self.strips.log_albedo(self.levels, np.zeros_like(self.slow))
         rows, precision = self.rows, self.precision
         if profile is not None:
             distance = np.round(self.strips.offset)
             rows = np.concatenate([rows, distance == np.unique(distance)[:, None]])
-        part = Eliminated.of(self.strips, rows, data, self.weights, self.spread)
+        moments = Moments.of(self.strips, rows, self.residual, self.weights, self.levels)
+        part = Eliminated.of(moments, self.spread)
         own = [size, *range(len(rows), len(part.gradient))]
         part.information[own, own] += precision
         part.gradient[own[2:]] -= precision[2:] * self.slow
@@ -134,7 +134,8 @@ class Nuisances:
 
     def scores(self) -> tuple[Array, Array]:
         """The strips' own gradients `[P, S]` and informations `[P, P, S]`."""
-        return strip_scores(self.strips, self.rows, self.residual, self.weights, self.levels, self.spread)
+        moments = Moments.of(self.strips, self.rows, self.residual, self.weights, self.levels)
+        return strip_scores(moments, self.spread)
 
     @property
     def slow_scatter(self) -> float:

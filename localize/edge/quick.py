@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from conespot.localize.model.estimate import Estimate
-from conespot.localize.model.forward import rotation_basis
+from conespot.localize.model.forward import cross, rotation_basis
 from conespot.localize.model.profile import Profile
 from conespot.localize.model.sight import Sight
 from conespot.localize.model.smooth import under_gaussian
@@ -96,7 +96,7 @@ class QuickBeam:
         rows = np.empty((6, len(d)))
         rows[:3] = falloff * np.where(lit, mean, 0.0) - slope * across
         for row, vector in enumerate(rotation_basis(pose.axis)[:2], start=3):
-            rows[row] = slope * (_cross(vector, pose.axis) @ to)
+            rows[row] = slope * (cross(vector, pose.axis) @ to)
         rows[5] = 0.5 * f * curve * blurs * np.square(stretch)
         width = math.sqrt(float(np.mean(spread / slopes)))
         return QuickLight(mean * f + mixed, rows, width, cosine, slopes, blurs, variance, mixed, blur)
@@ -183,8 +183,3 @@ class _Geometry:
 
 def _dot(a: Array, b: Array) -> Array:
     return np.asarray(a[0] * b[0] + a[1] * b[1] + a[2] * b[2])
-
-
-def _cross(a: Array, b: Array) -> Array:
-    """The cross product of two vectors `[3]`, in a tenth of the time of numpy's."""
-    return np.array([a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]])

@@ -92,9 +92,9 @@ class Strips:
         """What levels, slopes and odds, strips' own `[S, 2 or 3]` and `slow` ones `[Q]`, do to the log light `[N]`."""
         kinds, amounts = self.slow
         own = levels.copy()
-        for kind in range(own.shape[1]):
-            own[:, kind] += slow[kinds == kind] @ amounts[kinds == kind]
-        return np.asarray(np.einsum("kn,kn->n", self.own, own.T[:, self.index]))
+        for kind in set(kinds.tolist()):
+            own[:, kind] += (slow * (kinds == kind)) @ amounts
+        return np.asarray(np.einsum("kn,kn->n", self.own, own.T.take(self.index, axis=1)))
 
 
 @lru_cache(maxsize=64)
@@ -113,16 +113,17 @@ class Moments:
 
     strips: Strips
     rows: Array  #: `[R, N]`
-    weighted: Array  #: rows and data, times the bins' weights `[R + 1, N]`
+    weighted: Array  #: rows and residuals, times the bins' weights `[R + 1, N]`
+    levels: Array  #: of the strips' own in the data, beside the residuals `[2 or 3, S]`
     own: Array  #: products of the strips' own quantities `[2 or 3, 2 or 3, S]`
     right: Array  #: of those with all columns `[2 or 3, P + 1, S]`
     kinds: NDArray[np.intp]  #: which of its own quantities a strip has of each column but the rows and the data `[Q]`
     amounts: Array  #: and how much of it `[Q, S]`
 
     @classmethod
-    def of(cls, strips: Strips, rows: Array, data: Array, weights: Array) -> Moments:
-        """Of rows `[R, N]`, data and weights `[N]`."""
-        weighted = np.concatenate([rows, data[None]]) * weights
+    def of(cls, strips: Strips, rows: Array, residual: Array, weights: Array, levels: Array) -> Moments:
+        """Of rows `[R, N]`, weights `[N]`, and data: residuals `[N]` beside levels, slopes and odds `[S, 2 or 3]`."""
+        weighted = np.concatenate([rows, residual[None]]) * weights
         columns, size = strips.own, len(weighted)
         sums = strips.sums(np.concatenate([weighted, weights * columns, *(weighted * own for own in columns[1:])]))
         # the first is 1 throughout
@@ -135,8 +136,9 @@ class Moments:
             each[k:, k] = each[k, k:]
         slow, amounts = strips.slow
         kinds, amounts = np.append(0, slow), np.concatenate([np.ones((1, strips.count)), amounts])
-        every = np.concatenate([right[:, :-1], each[:, kinds] * amounts, right[:, -1:]], axis=1)
-        return cls(strips, rows, weighted, each, every, kinds, amounts)
+        data = right[:, -1:] + np.einsum("kls,sl->ks", each, levels)[:, None]
+        every = np.concatenate([right[:, :-1], each[:, kinds] * amounts, data], axis=1)
+        return cls(strips, rows, weighted, levels.T, each, every, kinds, amounts)
 
     def total(self) -> Array:
         """Products of all columns and the data with all columns, over all strips `[P + 1, P]`."""
@@ -145,6 +147,7 @@ class Moments:
         found[:, size:] = (self.right[self.kinds] @ self.amounts[..., None])[..., 0].T
         found[size:-1, :size] = found[:size, size:].T
         found[[*range(size), -1], :size] = self.weighted @ self.rows.T
+        found[-1, :size] += np.tensordot(self.levels, self.right[:, :size], ([0, 1], [0, 2]))
         return found
 
     def each(self) -> Array:
@@ -156,6 +159,7 @@ class Moments:
         for k, row in enumerate(self.rows):
             found[k:size, k] = found[k, k:size] = strips.sums(self.weighted[k:-1] * row)
             found[-1, k] = strips.sums(self.weighted[-1] * row)
+        found[-1, :size] += np.einsum("ks,kps->ps", self.levels, self.right[:, :size])
         return found
 
     def solved(self, spread: Array) -> tuple[Array, Array]:
@@ -183,12 +187,8 @@ class Eliminated:
         return np.asarray((np.append(-step, 1.0) @ self.own).T)
 
     @classmethod
-    def of(cls, strips: Strips, rows: Array, data: Array, weights: Array, spread: Array) -> Eliminated:
-        """From Jacobian rows `[R, N]`, data and weights `[N]`; `spread` `[2 or 3]`: prior sigmas of the strips' own.
-
-        Behind the rows' parameters are those of `Moments`: the level, and what varies slowly.
-        """
-        moments = Moments.of(strips, rows, data, weights)
+    def of(cls, moments: Moments, spread: Array) -> Eliminated:
+        """Of parameters in the order of the moments' columns; `spread` `[2 or 3]`: prior sigmas of the strips' own."""
         own, variance = moments.solved(spread)
         size = own.shape[1] - 1
         cross = np.tensordot(moments.right, own[:, :size], ([0, 2], [0, 2]))
@@ -196,15 +196,11 @@ class Eliminated:
         return cls(left[:size], left[size], own, variance)
 
 
-def strip_scores(
-    strips: Strips, rows: Array, residual: Array, weights: Array, levels: Array, spread: Array
-) -> tuple[Array, Array]:
+def strip_scores(moments: Moments, spread: Array) -> tuple[Array, Array]:
     """Each strip's own gradient `[P, S]` and information `[P, P, S]`, its level, slope and odds eliminated.
 
-    The parameters are those of `Eliminated.of`; `levels` `[S, 2 or 3]` are how far those are off their prior's mean.
+    As `Eliminated.of` has them; the levels of the moments are how far those are off their prior's mean.
     """
-    data = residual + np.einsum("kn,kn->n", strips.own, levels.T[:, strips.index])
-    moments = Moments.of(strips, rows, data, weights)
     own, _ = moments.solved(spread)
     left = moments.each() - np.einsum("kas,kbs->abs", moments.right, own[:, :-1])
     return left[-1], left[:-1]
@@ -240,6 +236,12 @@ def score_covariance(strips: Strips, scores: Array, parts: Array) -> Array:
     return np.asarray(total * np.outer(scale, scale))
 
 
+@lru_cache(maxsize=64)
+def _edges(count: int) -> NDArray[np.intp]:
+    """The first of the harmonics that are taken together, of so many."""
+    return np.unique(np.geomspace(_FITTED, count, 24).astype(np.intp))
+
+
 def _power(series: Array) -> Array:
     """The power spectra of series around the outline `[D, n]` at `[D, n // 2 + 1]` harmonics, smooth in frequency.
 
@@ -251,24 +253,27 @@ def _power(series: Array) -> Array:
     twice = np.where((harmonic == 0) | (2 * harmonic == count), 1.0, 2.0)
     raw = np.square(np.abs(np.fft.rfft(series))) / count + 1e-12
     # a handful of frequencies tells as much as all of them
-    edges = np.unique(np.geomspace(_FITTED, len(harmonic), 24).astype(int))
+    edges = _edges(len(harmonic))
     if len(edges) < 5:
         return np.tile(twice, (len(series), 1))
     number = np.diff(edges)
     observed = (np.add.reduceat(raw[:, : edges[-1]], edges[:-1], axis=1) / number)[:, None]
     middle = 0.5 * (edges[1:] + edges[:-1] - 1)
     shape = 1.0 / (1.0 + np.square(middle / _KNEES[:, None]))
-    both = np.stack([np.ones_like(shape), shape])[:, None]
-    amounts = 0.5 * observed.mean(axis=2) / both.mean(axis=3)
+    both = np.stack([np.ones_like(shape), shape], axis=1)
+    amounts = 0.5 * observed.mean(axis=2)[..., None] / both.mean(axis=2)
+    sides = np.empty((*amounts.shape[:2], 2, len(number)))  # what is seen, and the model, weighed by that
     for _ in range(20):
-        model = np.einsum("adk,akb->dkb", amounts, both[:, 0])
-        weight = number / np.square(model)
-        amounts = amounts * (weight * observed * both).sum(axis=3) / (weight * model * both).sum(axis=3)
+        model = (amounts[:, :, None] @ both)[:, :, 0]
+        np.divide(number, model, out=sides[:, :, 1])
+        np.multiply(sides[:, :, 1], observed / model, out=sides[:, :, 0])
+        seen, expected = np.moveaxis(sides @ both.transpose(0, 2, 1), 2, 0)
+        amounts = amounts * seen / expected
     cost = np.sum(number * (np.log(model) + observed / model), axis=2)
     # before any frame is seen, that strips err alone is as likely as all knees together; and a second parameter has
     # to be worth what it can fit of noise (Schwarz, Estimating the dimension of a model, Annals of Statistics 6, 1978)
     cost = cost + np.isfinite(_KNEES) * (0.5 * np.log(number.sum()) + np.log(len(_KNEES) - 1.0))
     share = np.exp(cost.min(axis=1, keepdims=True) - cost)
-    white, red = amounts * share / share.sum(axis=1, keepdims=True)
+    white, red = np.moveaxis(amounts, 2, 0) * share / share.sum(axis=1, keepdims=True)
     smooth = white.sum(axis=1)[:, None] + red @ (1.0 / (1.0 + np.square(harmonic / _KNEES[:, None])))
     return np.asarray(twice * np.maximum(smooth, 1e-9))

@@ -129,7 +129,7 @@ class Cones:
             slope = slope * f
             rows[:3] -= slope * rise.across.T
             for j, vector in enumerate(basis):
-                rows[3 + j] += slope * (to @ _cross(vector, axis))
+                rows[3 + j] += slope * (to @ cross(vector, axis))
         lit = cosine > 0.0
         rows[:3] += np.where(lit, total, 0.0) * falloff.T
         self.rows = rows
@@ -198,7 +198,7 @@ class _Cone:
         return self.spread.widths(self.rise).variance
 
 
-def _cross(a: Array, b: Array) -> Array:
+def cross(a: Array, b: Array) -> Array:
     """The cross product of two vectors `[3]`, in a tenth of the time of numpy's."""
     return np.array([a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]])
 

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from conespot.localize.model.estimate import Estimate
-from conespot.localize.model.forward import rotation_basis
+from conespot.localize.model.forward import cross, rotation_basis
 from conespot.localize.model.knowns import Knowns
 from conespot.localize.model.prior import prior_rows
 from conespot.localize.model.sight import Sight, look
@@ -32,7 +32,10 @@ def distances(pixels: Array, spots: NDArray[np.intp], estimate: Estimate) -> tup
     pose = estimate.pose
     each = spotlight_axes(pose, estimate.scene.spotlights)
     basis = rotation_basis(pose.axis)[: estimate.pose_size - 3]
-    turns = [-np.einsum("ij,ij->i", off.to, np.cross(vector, each)[spots]) / off.sine for vector in basis]
+    turns = [
+        -np.einsum("ij,ij->i", off.to, np.stack([cross(vector, axis) for axis in each])[spots]) / off.sine
+        for vector in basis
+    ]
     jacobian = np.column_stack([-off.across, *turns]) / off.slope[:, None]
     return off.distance, jacobian, -1.0 / off.slope
 

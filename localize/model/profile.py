@@ -151,19 +151,22 @@ class Profile:
         return np.pad(self.coefficients, ((0, 0), (0, 4 - self.coefficients.shape[1]))).T
 
     def _piecewise(self, coefficients: Array, w: Array) -> Array:
-        if len(self.knots) == 1:
-            x = w - self.knots[0]
-            return _polynomial(coefficients[0].tolist(), x) * (x >= 0.0)
-        piece = np.searchsorted(self.knots, w, side="right") - 1
-        x = w - self.knots[np.maximum(piece, 0)]
-        return np.where(piece >= 0, _polynomial(np.moveaxis(coefficients[np.maximum(piece, 0)], -1, 0), x), 0.0)
+        if len(self.knots) < 3:
+            found = np.zeros_like(w)
+            for knot, piece in zip(self.knots.tolist(), coefficients.tolist(), strict=True):
+                np.copyto(found, _polynomial(piece, w - knot), where=w >= knot)
+            return found
+        at = np.searchsorted(self.knots, w, side="right") - 1
+        x = w - self.knots[np.maximum(at, 0)]
+        return np.where(at >= 0, _polynomial(np.moveaxis(coefficients[np.maximum(at, 0)], -1, 0), x), 0.0)
 
 
 def _polynomial(coefficients: Sequence[float] | Array, x: Array) -> Array:
-    result = coefficients[-1]
+    result = coefficients[-1] + np.zeros_like(x)
     for row in coefficients[-2::-1]:
-        result = result * x + row
-    return result + np.zeros_like(x) if len(coefficients) == 1 else np.asarray(result)
+        result *= x
+        result += row
+    return np.asarray(result)
 
 
 def _corners(w: Array, p: Array, q: Array) -> Array:

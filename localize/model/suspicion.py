@@ -60,15 +60,19 @@ def watched(knowns: Knowns, scene: Scene) -> Knowns:
 
 
 def matter(names: list[str], gradient: Array, information: Array, size: int) -> bool:
-    """Whether any of the last parameters would be off by as much as counts, of blur and transfer, as `scores` has them.
+    """Whether any of the last parameters would be off by as much as counts, as `scores` has them.
 
-    Without the scatter of the gradient, which takes longer than all else.
+    Without the scatter of the gradient, which takes longer than all else; of the wall's shape only that one tells.
     """
     left, score, whole = _left(gradient, information, size)
     waves = [j for j, name in enumerate(names) if name == UNEVEN]
     if waves and _varies(score[waves], left[np.ix_(waves, waves)], whole[waves]):
         return True
-    return any(_is_material(names[j], score[j], left[j, j], whole[j]) for j in range(len(names)) if j not in waves)
+    return any(
+        name in _SHAPE or _is_material(name, score[j], left[j, j], whole[j])
+        for j, name in enumerate(names)
+        if name != UNEVEN
+    )
 
 
 def scores(names: list[str], gradient: Array, information: Array, scatter: Array, size: int) -> dict[str, float]:

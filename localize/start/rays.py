@@ -16,6 +16,7 @@ from conespot.localize.image import Signal
 from conespot.localize.model.deep import Deep
 from conespot.localize.model.occlusion import covered
 from conespot.localize.model.profile import Profile
+from conespot.localize.model.residual import median
 from conespot.localize.start.rings import Overview
 from conespot.localize.start.settings import START
 from conespot.scene.beam import Beam
@@ -106,7 +107,7 @@ def _across(
     ground = None if overview.reference is None else _sampled(overview.reference, at, blur)
     log = overview.logarithm(light, ground).astype(float)
     core = along < START.inside
-    inside, outside = (float(np.median(log[:, part])) for part in (core, along > START.outside))
+    inside, outside = (median(log[:, part]) for part in (core, along > START.outside))
     radius = size * overview.step * scene.camera.pixel_pitch
     profile = glowing(scene.beam, Deep.of(scene), radius)
     there, beyond = (
