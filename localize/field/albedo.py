@@ -8,11 +8,12 @@ and 0.0002 in red, is estimated from each image. A mode of wave number k in a wi
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.fft import fftfreq, rfftfreq
-from scipy.linalg import cho_factor, cho_solve
+from scipy.linalg import cho_solve, cholesky
 from scipy.linalg.lapack import dtrtri
 
 from conespot.localize.field.settings import FIELD
@@ -74,9 +75,14 @@ class Modes:
         c = coefficients.reshape(len(self.along_y), len(self.along_x))
         return np.asarray(self.along_y.T @ c @ self.along_x)
 
+    def fields(self, coefficients: Array) -> Array:
+        """The sums of the modes `[Q, h, w]` of several coefficients `[ny nx, Q]`."""
+        c = coefficients.T.reshape(-1, len(self.along_y), len(self.along_x))
+        return np.asarray(self.along_y.T @ c @ self.along_x)
+
     def project(self, images: Array) -> Array:
         """Sums of images `[Q, h, w]` times the modes `[ny nx, Q]`."""
-        return np.stack([(self.along_y @ image @ self.along_x.T).ravel() for image in images], axis=1)
+        return np.asarray((self.along_y @ images @ self.along_x.T).reshape(len(images), -1).T)
 
     def gram(self, weights: Array) -> Array:
         """Sums of the modes' products with `weights` `[h, w]`: `[ny nx, ny nx]`.
@@ -87,10 +93,16 @@ class Modes:
         t = self.twice_y @ weights @ self.twice_x.T
         i, j = np.arange(ny), np.arange(nx)
         rows = t[np.abs(i[:, None] - i)] + t[i[:, None] + i]  # [ny, ny, 2 nx]
-        both = rows[:, :, np.abs(j[:, None] - j)] + rows[:, :, j[:, None] + j]  # [ny, ny, nx, nx]
-        norm_y, norm_x = _norms(ny), _norms(nx)
-        both *= 0.25 * np.multiply.outer(np.outer(norm_y, norm_y), np.outer(norm_x, norm_x))
+        both = rows.take(np.abs(j[:, None] - j), axis=2)  # [ny, ny, nx, nx]
+        both += rows.take(j[:, None] + j, axis=2)
+        both *= self._norms
         return np.asarray(both.transpose(0, 2, 1, 3).reshape(ny * nx, ny * nx))
+
+    @cached_property
+    def _norms(self) -> Array:
+        """Of the products of modes, in the order in which `gram` makes them."""
+        y, x = (np.outer(norm, norm) for norm in (_norms(len(self.along_y)), _norms(len(self.along_x))))
+        return 0.25 * np.multiply.outer(y, x)
 
     def learnt(self, coefficients: Array, variances: Array, amplitudes: Array) -> Array:
         """The octaves' amplitudes that MacKay's fixed point makes of the modes' posterior means and variances.
@@ -119,8 +131,14 @@ class Eliminated:
     gradient: Array  #: `[P]`
     gain: Array  #: the modes' reaction to the parameters `[modes, P]`
     offset: Array  #: the modes for unchanged parameters `[modes]`
-    variances: Array  #: posterior variances of the modes `[modes]`
-    factor: tuple[Array, bool]  #: Cholesky's, of the modes' own normal equations
+    factor: Array  #: Cholesky's, of the modes' own normal equations `[modes, modes]`
+
+    @cached_property
+    def variances(self) -> Array:
+        """Posterior variances of the modes `[modes]`."""
+        # the diagonal of the inverse is the sum of squares of the inverse factor's columns
+        inverse = dtrtri(self.factor, lower=1)[0]
+        return np.asarray(np.einsum("ij,ij->j", inverse, inverse))
 
     def coefficients(self, step: Array) -> Array:
         """The modes after the parameters moved by `step` `[P]`."""
@@ -128,7 +146,7 @@ class Eliminated:
 
     def fitted(self, right: Array) -> Array:
         """The modes `[modes, Q]` of other data, whose weighted sums with the modes are `right` `[modes, Q]`."""
-        return np.asarray(cho_solve(self.factor, right))
+        return np.asarray(cho_solve((self.factor, True), right))
 
 
 def eliminate(modes: Modes, weights: Array, jacobian: Array, data: Array, amplitudes: Array) -> Eliminated:
@@ -136,17 +154,16 @@ def eliminate(modes: Modes, weights: Array, jacobian: Array, data: Array, amplit
     system = modes.gram(weights)
     system[np.diag_indices_from(system)] += modes.precision(amplitudes)
     count = len(jacobian)
-    weighted = jacobian * weights
-    flat, y = weighted.reshape(count, -1), data.ravel()
-    right = modes.project(np.concatenate([weighted, (weights * data)[None]]))
-    factor = cho_factor(system, lower=True)
-    solved = cho_solve(factor, right)
+    weighted = np.empty((count + 1, *weights.shape))
+    np.multiply(jacobian, weights, out=weighted[:count])
+    np.multiply(data, weights, out=weighted[count])
+    flat, y = weighted[:count].reshape(count, -1), data.ravel()
+    right = modes.project(weighted)
+    factor = cholesky(system, lower=True, overwrite_a=True)
+    solved = cho_solve((factor, True), right)
     information = flat @ jacobian.reshape(count, -1).T - right[:, :count].T @ solved[:, :count]
     gradient = flat @ y - right[:, :count].T @ solved[:, count]
-    # the diagonal of the inverse is the sum of squares of the inverse factor's columns
-    inverse = np.tril(dtrtri(factor[0], lower=1)[0])
-    variances = np.sum(np.square(inverse), axis=0)
-    return Eliminated(information, gradient, solved[:, :count], solved[:, count], variances, factor)
+    return Eliminated(information, gradient, solved[:, :count], solved[:, count], factor)
 
 
 def _octave(k: Array) -> NDArray[np.intp]:

@@ -22,7 +22,7 @@ from conespot.localize.model.estimate import Estimate
 from conespot.localize.model.knowns import Knowns
 from conespot.localize.model.noise import NoiseModel
 from conespot.localize.model.prior import prior_rows
-from conespot.localize.model.solve import STEP, inverse, limited
+from conespot.localize.model.solve import STEP, inverse, limited, reduction
 from conespot.localize.model.suspicion import TRANSFER, matter, scores
 from conespot.localize.model.transfer import mistake
 from conespot.localize.model.view import Bins, Shown, Window, log_albedo, visible
@@ -47,7 +47,6 @@ class FieldFit:
     settled: bool  #: whether the last step was small
     lit_share: float  #: share of the predicted patches that the frame shows and that is not clipped
     knowns: Knowns  #: by which it was fitted
-    contradicted: bool  #: whether the windows show what was taken as told to be otherwise
 
     @cached_property
     def covariance(self) -> Array:
@@ -57,24 +56,60 @@ class FieldFit:
         meat[:size, :size] += self.prior
         return np.asarray((bread @ meat @ bread)[:size, :size])
 
+    @cached_property
+    def _seen(self) -> tuple[Array, Array]:
+        """Information and gradient where the fit stands, after its last step, as the windows see them, without priors.
+
+        Of the pose, what is free or doubted, the gain, and how values were decoded, if that may have been amiss.
+        """
+        transfer = mistake(self.estimate.scene.sensor)
+        lights = [piece.bins.spotlight(self.estimate, self.knowns.doubting)[self.lead] for piece in self.pieces]
+        size = len(lights[0][1]) + (1 if transfer is None else 2)
+        information, gradient = np.zeros((size, size)), np.zeros(size)
+        if not _finite(lights):
+            return information * np.nan, gradient * np.nan
+        for piece, light in zip(self.pieces, lights, strict=True):
+            # the pieces stay as they are
+            part, slope = copy(piece).linearize(*light, self.gain, transfer)
+            information, gradient = information + part, gradient + slope
+        return information, gradient
+
+    def contradicts(self, nominal: Scene) -> bool:
+        """Whether the windows show that to be otherwise than `nominal` which the knowns doubt."""
+        doubted = self.knowns.doubting
+        told, rows = prior_rows(self.estimate, nominal, doubted)
+        size = rows.shape[1]
+        information, gradient = self._seen[0][: size + 1, : size + 1].copy(), self._seen[1][: size + 1].copy()
+        if not np.isfinite(information).all():
+            return False
+        information[:size, :size] += rows.T @ rows
+        gradient[:size] -= rows.T @ told
+        reduced = reduction(information, size)  # without the gain
+        return contradicted(reduced @ information @ reduced.T, reduced @ gradient, self.estimate, doubted, self.knowns)
+
     def suspicions(self, nominal: Scene) -> dict[str, float]:
         """The score of how values were decoded, where the fit stands, over its sigma: see `model.suspicion`."""
         size, transfer = len(self.normal), mistake(nominal.sensor)
         if transfer is None:
             return {}
         told, rows = prior_rows(self.estimate, nominal, self.knowns)
-        gradient, information = np.zeros(size + 1), np.zeros((size + 1, size + 1))
-        information[: size - 1, : size - 1], gradient[: size - 1] = rows.T @ rows, -rows.T @ told
-        meat = information.copy()
+        prior, pull = np.zeros((size + 1, size + 1)), np.zeros(size + 1)
+        prior[: size - 1, : size - 1], pull[: size - 1] = rows.T @ rows, -rows.T @ told
+        both = (
+            *self.estimate.pose_size * [True],
+            *(each in self.knowns.free for each in self.knowns.doubting.free),
+            True,
+            True,
+        )
+        kept = np.flatnonzero(both)
+        gradient, information = self._seen[1][kept] + pull, self._seen[0][np.ix_(kept, kept)] + prior
+        if not np.isfinite(information).all() or not matter([TRANSFER], gradient, information, size):
+            return {}
         pieces = [copy(piece) for piece in self.pieces]
         for piece in pieces:
-            light = piece.bins.spotlight(self.estimate)[self.lead]
-            part, slope = piece.linearize(*light, self.gain, transfer)
-            information, gradient = information + part, gradient + slope
-        if not matter([TRANSFER], gradient, information, size):
-            return {}
+            piece.linearize(*piece.bins.spotlight(self.estimate)[self.lead], self.gain, transfer)
         bread, still = inverse(information), np.zeros(size + 1)
-        meat = sum((piece.scatter(still, bread) for piece in pieces), meat)
+        meat = sum((piece.scatter(still, bread) for piece in pieces), prior)
         return scores([TRANSFER], gradient, information, meat, size)
 
 
@@ -86,13 +121,12 @@ def fit_patch(
     used = knowns
     for level in FIELD.levels:
         while True:
-            doubted = knowns.doubting if used == knowns else None
-            found = fit_field(frame, start, fit, used, noise, reference, level, doubted)
+            found = fit_field(frame, start, fit, used, noise, reference, level)
             if isinstance(found, LocalizationFailure):
                 # what starts inside the frame and leaves it has run off
                 return found if fit is None else LocalizationFailure(UNCERTAIN)
-            fit, start = found, found.estimate
-            if not found.contradicted:
+            nominal, fit, start = start.scene, found, found.estimate
+            if used == knowns.doubting or not found.contradicts(nominal):
                 break
             used = knowns.doubting
     assert fit is not None
@@ -107,13 +141,11 @@ def fit_field(
     noise: NoiseModel,
     reference: Reference | None,
     level: Level,
-    doubted: Knowns | None = None,
 ) -> FieldFit | LocalizationFailure:
     """Fit pose, gain and albedo to windows as fine as the `level` says, from `start`.
 
     The first iterations may keep the axis on the RCM, so that a poor start cannot run off along the soft directions of
-    a free fit. `before` is a coarser fit, to start its albedo and gain from. What is `doubted` leaves more free than
-    `knowns` do: whether the windows contradict them is asked at the end.
+    a free fit. `before` is a coarser fit, to start its albedo and gain from.
     """
     nominal, estimate = start.scene, start
     size = start.pose_size + len(knowns.free)
@@ -147,11 +179,6 @@ def fit_field(
         settled = length < STEP.settled_sigmas
         if length < FIELD.done_sigmas and count >= max(level.tied, 1):
             break
-    doubt = False
-    if doubted is not None:
-        seen = [piece.bins.spotlight(estimate, doubted)[lead] for piece in pieces]
-        # the pieces stay as they are
-        doubt = _contradicted([copy(piece) for piece in pieces], seen, gain, estimate, nominal, (doubted, knowns))
     return FieldFit(
         estimate,
         tuple(pieces),
@@ -164,34 +191,6 @@ def fit_field(
         settled,
         visible(estimate) * float(np.mean([piece.unclipped() for piece in pieces])),
         knowns,
-        doubt,
-    )
-
-
-def _contradicted(
-    pieces: Sequence[Piece],
-    lights: Sequence[tuple[Array, Array]],
-    gain: float,
-    estimate: Estimate,
-    nominal: Scene,
-    doubt: tuple[Knowns, Knowns],
-) -> bool:
-    """Whether the windows show that to be otherwise which the first of `doubt` leaves free, and the second does not."""
-    knowns, told = doubt
-    residuals, rows = prior_rows(estimate, nominal, knowns)
-    equations = _equations(pieces, lights, gain, rows.T @ rows, -rows.T @ residuals)
-    if equations is None:
-        return False
-    information, _, _ = equations
-    gradient = information @ equations[2]
-    size = len(gradient) - 1
-    own = information[:size, size] / max(information[size, size], 1e-300)
-    return contradicted(
-        information[:size, :size] - np.outer(own, information[size, :size]),
-        gradient[:size] - own * gradient[size],
-        estimate,
-        knowns,
-        told,
     )
 
 
@@ -223,6 +222,10 @@ def _pieces(
     ]
 
 
+def _finite(lights: Sequence[tuple[Array, Array]]) -> bool:
+    return all(np.isfinite(light).all() and np.isfinite(rows).all() for light, rows in lights)
+
+
 def _equations(
     pieces: Sequence[Piece], lights: Sequence[tuple[Array, Array]], gain: float, prior: Array, pull: Array
 ) -> tuple[Array, Array, Array] | None:
@@ -231,7 +234,7 @@ def _equations(
     `prior` `[P, P]` and its `pull` `[P]` are added to what the pieces say. None if it is singular, or a
     piece's model has no light or no end of it, as it may where a frame is black without noise.
     """
-    if not all(np.isfinite(light).all() and np.isfinite(rows).all() for light, rows in lights):
+    if not _finite(lights):
         return None
     size = len(pull)
     information, gradient = np.zeros((size + 1, size + 1)), np.zeros(size + 1)

@@ -155,14 +155,14 @@ class Piece:
         gain = solved.gain[:, :size] - solved.gain[:, size:] @ self._reaction
         own = every[:size] - np.tensordot(self._reaction.T, every[size:], 1)
         root = np.sqrt(self._weights)
-        rows = root * np.stack([row - basis.field(imitated) for row, imitated in zip(own, gain.T, strict=True)])
+        rows = root * (own - basis.fields(gain))
         both = np.append(step, self._share - self._reaction @ step)
         left = self._data - basis.field(solved.coefficients(both)) - np.tensordot(both, every, 1)
         # always the same noise, so that a frame has one answer
         noise = np.random.default_rng(0).standard_normal((FIELD.whites, height, width)) * (root > 0.0)
         modes = solved.fitted(basis.project(root * noise))
-        moves = bread @ np.einsum("phw,nhw->pn", rows, noise)
-        white = noise - np.stack([root * basis.field(one) for one in modes.T]) - np.einsum("phw,pn->nhw", rows, moves)
+        moves = bread @ np.tensordot(rows, noise, ([1, 2], [1, 2]))
+        white = noise - root * basis.fields(modes) - np.tensordot(moves.T, rows, 1)
         known = self._reaction.T @ self._reaction / FIELD.chroma**2
         return known + albedo_scatter(root * rows, basis, self._spectrum) + rest_scatter(rows, root * left, white)
 
