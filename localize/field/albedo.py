@@ -159,7 +159,7 @@ def eliminate(modes: Modes, weights: Array, jacobian: Array, data: Array, amplit
     np.multiply(data, weights, out=weighted[count])
     flat, y = weighted[:count].reshape(count, -1), data.ravel()
     right = modes.project(weighted)
-    factor = cholesky(system, lower=True, overwrite_a=True)
+    factor = cholesky(system.T, lower=True, overwrite_a=True)
     solved = cho_solve((factor, True), right)
     information = flat @ jacobian.reshape(count, -1).T - right[:, :count].T @ solved[:, :count]
     gradient = flat @ y - right[:, :count].T @ solved[:, count]

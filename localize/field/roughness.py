@@ -59,10 +59,12 @@ def _shared(residuals: Array, lit: NDArray[np.bool_]) -> float:
     if np.count_nonzero(lit) < 2 * FIELD.near**2:
         return 1.0
     reach = FIELD.near
+    box = tuple(slice(at[0], at[-1] + 1) for at in (np.flatnonzero(lit.any(axis=axis)) for axis in (1, 0)))
+    residuals, lit = residuals[box], lit[box]
     shape = tuple(scipy.fft.next_fast_len(side + reach, real=True) for side in lit.shape)
     products, pairs = (
         scipy.fft.irfft2(np.square(np.abs(scipy.fft.rfft2(plane, shape))), shape)[:reach, :reach]
-        for plane in (residuals, lit.astype(float))
+        for plane in (residuals.astype(np.float32), lit.astype(np.float32))
     )
     distance = np.hypot(*np.mgrid[:reach, :reach])
     ring = np.round(distance).astype(np.intp).ravel()

@@ -37,7 +37,7 @@ def albedo_scatter(rows: Array, modes: Modes, amplitudes: Array) -> Array:
     shape = _shape(rows)
     waves = scipy.fft.rfft2(rows.astype(np.float32), shape)
     density = modes.density(shape, amplitudes) * _twice(shape)
-    return _products(waves * density, waves) / (shape[0] * shape[1] * modes.bin_mm**2)
+    return _products(waves, density) / (shape[0] * shape[1] * modes.bin_mm**2)
 
 
 def rest_scatter(rows: Array, residuals: Array, white: Array) -> Array:
@@ -59,12 +59,13 @@ def rest_scatter(rows: Array, residuals: Array, white: Array) -> Array:
     power = [np.bincount(ring.ravel(), plane.ravel(), minlength=_RINGS + 1) for plane in each]
     spectrum = power[0] / np.maximum(np.mean(power[1:], axis=0), 1e-300)
     waves = scipy.fft.rfft2(rows.astype(np.float32), shape)
-    return _products(waves * (spectrum[ring] * twice), waves) / (shape[0] * shape[1])
+    return _products(waves, spectrum[ring] * twice) / (shape[0] * shape[1])
 
 
-def _products(a: Waves, b: Waves) -> Array:
-    """Sums over the waves of the products of transforms `[P, h, w]`: `[P, P]`."""
-    return np.asarray(np.real(a.reshape(len(a), -1) @ b.reshape(len(b), -1).conj().T))
+def _products(waves: Waves, weights: Array) -> Array:
+    """Sums over the waves of the products of transforms `[P, h, w]`, each counted by `weights` `[h, w]`: `[P, P]`."""
+    each = (waves * np.sqrt(weights)).reshape(len(waves), -1).view(np.float64)  # real and imaginary parts
+    return np.asarray(each @ each.T)
 
 
 def _shape(rows: Array) -> tuple[int, int]:
