@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from conespot.localize.model.profile import Profile
-from conespot.localize.model.sight import Sight
+from conespot.localize.model.sight import Sight, some
 
 Array = NDArray[np.float64]
 
@@ -76,10 +76,10 @@ class Rise:
         gx, gy, d, c = self.gx[at], self.gy[at], self.d[at], self.c[at]
         length = np.maximum(np.hypot(gx, gy), 1e-300)
         ex, ey = gx / length, gy / length
-        x, y, to = self.sight.along_x[at], self.sight.along_y[at], self.to[at]
+        x, y, to = (some(vectors, at) for vectors in (self.sight.along_x, self.sight.along_y, self.to))
         ax, ay = np.einsum("ij,ij->i", to, x) / d, np.einsum("ij,ij->i", to, y) / d
         xx, xy, yy = np.einsum("ij,ij->i", x, x), np.einsum("ij,ij->i", x, y), np.einsum("ij,ij->i", y, y)
-        flat = np.einsum("ij,ij->i", self.across[at], self.sight.normals[at]) / radius - c / np.square(d)
+        flat = np.einsum("ij,ij->i", some(self.across, at), some(self.sight.normals, at)) / radius - c / np.square(d)
         along, across = ex * ay - ey * ax, ex * ax + ey * ay
         # along the edge the cosine does not rise
         tangential = c * np.square(along) + flat * (ey * ey * xx - 2.0 * ex * ey * xy + ex * ex * yy)

@@ -16,7 +16,10 @@ _TRACED, _DEGREE = 100, 3
 
 @dataclass(frozen=True)
 class Sight:
-    """What the pixels look at: surface points, their normals, and how the points move with the pixel."""
+    """What the pixels look at: surface points, their normals, and how the points move with the pixel.
+
+    Arrays of vectors have their components first in memory: sums over them are then sums of long vectors.
+    """
 
     points: Array  #: `[N, 3]` [mm]
     normals: Array  #: unit, towards the inside `[N, 3]`
@@ -28,7 +31,13 @@ class Sight:
     def part(self, at: NDArray[np.intp]) -> Sight:
         """What some of the pixels look at."""
         confusion = self.confusion[at] if len(self.confusion) else self.confusion
-        return Sight(self.points[at], self.normals[at], self.along_x[at], self.along_y[at], self.side, confusion)
+        points, normals = some(self.points, at), some(self.normals, at)
+        return Sight(points, normals, some(self.along_x, at), some(self.along_y, at), self.side, confusion)
+
+
+def some(vectors: Array, at: NDArray[np.intp]) -> Array:
+    """Some of the vectors `[N, 3]` of a sight, which have their components first in memory and keep them so."""
+    return vectors.T.take(at, axis=1).T
 
 
 def look(scene: Scene, pixels: Array, side: float = 1.0) -> Sight:
@@ -37,7 +46,7 @@ def look(scene: Scene, pixels: Array, side: float = 1.0) -> Sight:
     Raises nothing: where a ray misses the eye the points are NaN.
     """
     eye, rays = scene.eye, scene.camera.rays(pixels)
-    d = rays.directions
+    d = np.asfortranarray(rays.directions)
     points = scene.surface.intersect(eye, rays.origins, d)
     if scene.surface.is_sphere:
         normals = (eye.centre - points) / eye.radius
@@ -49,13 +58,14 @@ def look(scene: Scene, pixels: Array, side: float = 1.0) -> Sight:
 
     def along(origins: Array, directions: Array) -> Array:
         """How the point moves with a ray that moves so: along the ray as far as keeps it on the surface."""
-        step = side * (origins + distance * directions)
+        step = side * (origins + distance * np.asfortranarray(directions))
         return np.asarray(step - (np.einsum("ij,ij->i", normals, step) / facing)[:, None] * d)
 
     along_x = along(rays.origins_by_x, rays.directions_by_x)
     along_y = along(rays.origins_by_y, rays.directions_by_y)
     confusion = np.zeros(0) if scene.camera.pupil == 0.0 else _confusion(scene, pixels, points)
-    return Sight(points, normals, along_x, along_y, side, confusion)
+    first = np.asfortranarray
+    return Sight(first(points), first(normals), first(along_x), first(along_y), side, confusion)
 
 
 def _confusion(scene: Scene, pixels: Array, points: Array) -> Array:

@@ -90,8 +90,9 @@ def cramer_rao(
         margin = THEORY.glow_reach * deep.kernels[0].reach(0.5) / scene.camera.pixel_pitch
     pixels = patch_pixels(scene, pose, margin)
     sight = look(scene, pixels)
-    seen = np.isfinite(sight.points[:, 0])
-    light, rows = Irradiance(sight.part(seen), pixels[seen], 1, estimate, knowns, seen[seen])(estimate)[0]
+    seen = np.flatnonzero(np.isfinite(sight.points[:, 0]))
+    every = np.ones(len(seen), bool)
+    light, rows = Irradiance(sight.part(seen), pixels[seen], 1, estimate, knowns, every)(estimate)[0]
     peak = float(np.quantile(light[light > 0.0], THEORY.peak_quantile)) if np.any(light > 0.0) else 0.0
     if peak <= 0.0:
         raise ValueError("the frame shows no patch of this pose")
