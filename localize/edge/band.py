@@ -16,12 +16,13 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
+from conespot.localize.edge.moments import Eliminated, of_shared
 from conespot.localize.edge.nuisances import Nuisances, first_gain, gain_over
 from conespot.localize.edge.ribbon import Ribbon
 from conespot.localize.edge.sandwich import EdgeFit
 from conespot.localize.edge.seen import Seen
 from conespot.localize.edge.settings import EDGE
-from conespot.localize.edge.strips import Eliminated, of_shared, score_covariance
+from conespot.localize.edge.strips import score_covariance
 from conespot.localize.edge.surroundings import surroundings
 from conespot.localize.image import Frame, Reference
 from conespot.localize.model.deep import Deep
@@ -79,8 +80,7 @@ class BandFit(EdgeFit):
 
     def scatter(self) -> Array:
         """Covariance of the gradient `[P, P]` as the strips' residuals show it."""
-        scores, parts, known = self._strips(self.channels, self.prior)
-        return score_covariance(self.channels[0].strips, scores, parts) + known
+        return self._scatter(self.channels, self.prior)
 
     def without_profile(self, sigma: float) -> tuple[Array, Array]:
         """Information `[P, P]` and gradient `[P]` that are lost if the profile across the outlines is not known.
@@ -157,16 +157,13 @@ class BandFit(EdgeFit):
         kept = [copy(channel) for channel in channels]
         for channel in kept:
             channel.rows = channel.rows[rows]
-        scores, parts, known = self._strips(kept, prior[:, of])
         follows = float(np.mean([channel.follows for channel in channels]))
-        return score_tests(
-            names, gradient[of] / follows, information[np.ix_(of, of)],
-            score_covariance(self.channels[0].strips, scores, parts) + known, len(self.information),
-        )  # fmt: skip
+        scatter, size = self._scatter(kept, prior[:, of]), len(self.information)
+        return score_tests(names, gradient[of] / follows, information[np.ix_(of, of)], scatter, size)
 
     @staticmethod
-    def _strips(channels: Sequence[Nuisances], prior: Array) -> tuple[Array, Array, Array]:
-        """The strips' gradients `[S, P]` and informations `[S, P, P]`, and the covariance `[P, P]` of the priors'."""
+    def _scatter(channels: Sequence[Nuisances], prior: Array) -> Array:
+        """The same of other parameters `[P, P]`, of which the channels have rows and the prior `[Q, P]` too."""
         size, strips = prior.shape[1], channels[0].strips
         scores, parts = np.zeros((strips.count, size)), np.zeros((strips.count, size, size))
         known = prior.T @ prior
@@ -178,7 +175,7 @@ class BandFit(EdgeFit):
             known = known + (reduced[:, size:] * channel.precision) @ reduced[:, size:].T
             scores = scores + (reduced @ gradient).T / channel.follows
             parts = parts + of_shared(own, reduced)
-        return scores, parts, known
+        return score_covariance(strips, scores, parts) + known
 
 
 def fit_band(
@@ -206,10 +203,9 @@ def fit_band(
     band = replace(band, strips=replace(band.strips, sloping=not stage.sharp))
     if reference is not None:
         band = band.told(reference, nominal, noise)
-    sight = band.sight
-    irradiance = ambient_irradiance(sight, nominal)
+    irradiance = ambient_irradiance(band.sight, nominal)
     pitch = nominal.camera.pixel_pitch * side
-    shed = Irradiance(sight, band.pixels, side, estimate, knowns, np.ones(len(band.pixels), bool))
+    shed = Irradiance(band.sight, band.pixels, side, estimate, knowns, np.ones(len(band.pixels), bool))
     lights = shed(estimate)
     each = 3 if lights.odds else 2  # quantities of a strip
     if before is None:
@@ -241,7 +237,7 @@ def fit_band(
         length = float(step @ information @ step)
         if length < stage.enough**2 and turn >= 2:
             break
-    seen = Seen(sight, band.pixels, side, irradiance, shed)
+    seen = Seen(band.sight, band.pixels, side, irradiance, shed)
     return BandFit(estimate, information, pj, step, band.covered, knowns, tuple(channels), seen)
 
 

@@ -12,9 +12,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from conespot.localize.edge.moments import Moments, of_shared, strip_scores
 from conespot.localize.edge.nuisances import Nuisances, first_levels
 from conespot.localize.edge.settings import EDGE
-from conespot.localize.edge.strips import Moments, Strips, of_shared, strip_scores
+from conespot.localize.edge.strips import Strips
 from conespot.localize.model.noise import NoiseModel
 from conespot.localize.model.residual import RESIDUAL, follows, incident_light, median, rest, rms
 from conespot.localize.model.view import Shown

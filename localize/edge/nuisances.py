@@ -9,8 +9,9 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from conespot.localize.edge.moments import Eliminated, Moments, strip_scores
 from conespot.localize.edge.settings import EDGE
-from conespot.localize.edge.strips import Eliminated, Moments, Strips, strip_scores
+from conespot.localize.edge.strips import Strips
 from conespot.localize.model.noise import NoiseModel
 from conespot.localize.model.residual import (
     censored,
