@@ -6,6 +6,9 @@ and told nothing: that the world is `theatre-ideal`, its light and camera apart.
 and are in no effect: beam, camera, wall and transfer. The RCM is told with an error of 0.05 mm along each axis, which
 is also its sigma. `--poses N` frames a cell, `--columns N` px, `--effects` by name. What is in ROWS.csv is not measured
 again, so that the command can be stopped and given again with more poses. Printed: the matrix of docs/localizers.md.
+
+Rendered so that rendering adds nothing: with 16 samples and 512 on edges, 83 % of 24 tips of the ideal world were
+inside their 95 % ellipsoids, with these 96 %.
 """
 
 from __future__ import annotations
@@ -217,7 +220,7 @@ def main() -> None:
         every = [w for w in worlds(asked.columns) if not asked.effects or w.effect in asked.effects]
         for world in every:
             missing = [n for n in range(asked.poses) if (world.effect, n, asked.columns) not in done]
-            renderer = Renderer(world.true, samples=16, edge_samples=512) if missing else None
+            renderer = Renderer(world.true, samples=128, edge_samples=8192) if missing else None
             for number in missing:
                 assert renderer is not None
                 new = list(answers(world, view_of(world, renderer, number), number, asked.columns))

@@ -102,6 +102,7 @@ def judged(
     size = estimate.pose_size
     joint = covariance.copy()
     joint[np.arange(3), np.arange(3)] += VERDICT.floor_mm**2 + sag_sigma(nominal) ** 2
+    joint[:3, :3] += _of_colours(estimate)
     joint[np.arange(3, size), np.arange(3, size)] += VERDICT.floor_rad**2
     pose = joint[:size, :size].copy()
     variances = np.diag(pose)
@@ -136,6 +137,19 @@ def judged(
             estimate.pose.apex, estimate.pose.axis, pose, roll=estimate.pose.roll, distance=distance, camera=camera
         )
     return Localization(estimate.pose.apex, estimate.pose.axis, pose, distance=distance, camera=camera)
+
+
+def _of_colours(estimate: Estimate) -> Array:
+    """Covariance of the tip `[3, 3]` [mm^2] from the image's size, which the light's colours change.
+
+    A patch that is larger by a part is taken for that of a tip which is farther from the wall by that part.
+    """
+    scene, pose = estimate.scene, estimate.pose
+    sigma = scene.image_size_sigma
+    if sigma == 0.0:
+        return np.zeros((3, 3))
+    farther = sigma * (scene.surface.intersect(scene.eye, pose.apex, pose.axis) - pose.apex)
+    return np.outer(farther, farther)
 
 
 def _moved(found: Camera, nominal: Camera) -> Camera | None:

@@ -15,6 +15,7 @@ from pydantic import BeforeValidator, Field, model_validator
 from conespot.scene import fundus
 from conespot.scene.beam import Beam, CyclesBeam
 from conespot.scene.camera import Camera
+from conespot.scene.dispersion import seen_light, size_sigma, wavelength_of_image
 from conespot.scene.document import Document, find_document, is_file, merge, read_document
 from conespot.scene.eye import Eye, Globe
 from conespot.scene.illumination import Ambient, FlatBand, Illumination
@@ -179,22 +180,30 @@ class Scene(Model):
 
     @property
     def effective_wavelength(self) -> float:
-        """Centroid of the spotlights' light as the sensor sees it, over all its channels [nm].
+        """Wavelength of the spotlights' light as the sensor sees it, over all its channels [nm].
 
-        What the camera's rays and a localizer's forward model see at, where every wavelength goes its own way. From a
-        living fundus light comes in the perifovea's colour.
+        What the camera's rays and a localizer's forward model see at, where every wavelength goes its own way: that
+        whose image is as large as the light's; without optics its centroid. From a living fundus light comes in the
+        perifovea's colour.
         """
-        light = self.illumination.spectrum
-        if self.retina.is_spectral:
-            x = np.arange(300.0, 1101.0)
-            light = light.times(Curve(x, fundus.reflectance(x, fundus.SITES["perifovea"])))
-        responses = self.sensor.responses
-        seen = [light] if responses is None else [light.times(response) for response in responses.values()]
-        weights = np.array([curve.integral() for curve in seen])
-        if not weights.sum() > 0.0:
-            return light.mean_wavelength
-        means = [curve.mean_wavelength if weight > 0.0 else 0.0 for curve, weight in zip(seen, weights, strict=True)]
-        return float(weights @ means / weights.sum())
+        light, optics = self._seen(fundus.SITES["perifovea"]), self.camera.optics
+        if not light.integral() > 0.0:
+            return self.illumination.spectrum.mean_wavelength
+        return light.mean_wavelength if optics is None else wavelength_of_image(optics, self.camera.height, light)
+
+    @property
+    def image_size_sigma(self) -> float:
+        """Standard deviation of the image's size, relative: through optics it changes with the retina's colour."""
+        optics = self.camera.optics
+        if optics is None or not self.retina.is_spectral:
+            return 0.0
+        places = [replace(site, melanin=m) for site in fundus.SITES.values() for m in fundus.MELANIN.values()]
+        return size_sigma(optics, self.camera.height, [self._seen(place) for place in places])
+
+    def _seen(self, place: fundus.Pigments) -> Curve:
+        """The spotlights' light as the sensor sees it, from a place of a living fundus."""
+        seen = place if self.retina.is_spectral else None
+        return seen_light(self.illumination.spectrum, seen, self.camera.optics, self.sensor.responses)
 
     def sway(self, time: float = 0.0, seed: int = 0) -> NDArray[np.float64] | None:
         """A pose's `sway` `[K, 3]` [mm] at a `time` [s], for the `seed` of a tremor; None without motion."""

@@ -72,7 +72,7 @@ def test_the_exact_method_sees_through_lens_and_contact_lens_with_the_lights_own
     )
     scene = Scene(beam=HardBeam(), camera=camera, sensor=Linear(bits=12), illumination="ir850")
     tip = np.array([0.4, 0.3, 3.0])
-    image = photograph(scene, scene.pose(tip), rays=6)
+    image = photograph(scene, scene.pose(tip), rays=12)
     yellow = scene.model_copy(update={"camera": camera.seeing(589.3)})
     off, wrong = (locate(image, told, "cone", noise=NOISE).apex_mm - tip for told in (scene, yellow))
     assert np.linalg.norm(off) < 3e-3 < np.linalg.norm(wrong)

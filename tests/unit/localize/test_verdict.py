@@ -21,7 +21,8 @@ from conespot.localize.verdict import (
 )
 from conespot.scene import Pose
 from conespot.scene.beam import HardBeam
-from conespot.scene.scene import Scene
+from conespot.scene.document import Document
+from conespot.scene.scene import Scene, read_scene
 from conespot.scene.spotlights import RIGS
 
 TIP = np.array([1.0, 0.5, 4.0])
@@ -39,6 +40,18 @@ def test_a_fit_that_agrees_with_its_model_comes_with_its_covariance():
     assert isinstance(found, Localization)
     np.testing.assert_array_equal(found.apex_mm, TIP)
     np.testing.assert_allclose(np.sqrt(np.diag(found.covariance)), SIGMAS, rtol=1e-3)
+
+
+def test_light_of_many_colours_seen_through_the_eyes_optics_leaves_it_open_how_far_from_the_wall_a_tip_is():
+    data = {"retina": "fundus", "sensor": "cmv12000-mono", "camera": {"resolution": 400, "optics": {"contact": "flat"}}}
+    white, green = (
+        read_scene(Document("test", {**data, "eye": {"radius": "12 mm"}, "illumination": light}))
+        for light in ("led-b3", "line532")
+    )
+    many, one = (verdict(sigmas=1e-2 * SIGMAS, scene=scene) for scene in (white, green))
+    wider = many.covariance[:3, :3] - one.covariance[:3, :3]
+    farther = white.image_size_sigma * many.distance.along_mm
+    np.testing.assert_allclose(wider, np.square(farther) * np.outer(many.axis, many.axis), rtol=0.01, atol=1e-11)
 
 
 def test_correlated_residuals_widen_the_covariance():
