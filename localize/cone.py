@@ -8,8 +8,9 @@ from __future__ import annotations
 
 from dataclasses import replace
 
+from conespot.localize.disc.fit import unless_disc
 from conespot.localize.doubt import answered, noise_of
-from conespot.localize.edge.fit import fit_edge
+from conespot.localize.edge.fit import fit_edge, is_clipped, is_sharp
 from conespot.localize.edge.sandwich import EdgeFit
 from conespot.localize.image import AnyImage, Frame, Reference
 from conespot.localize.model.estimate import Estimate
@@ -37,7 +38,10 @@ def cone(
     sensor = noise_of(frame, noise)
 
     def localized(start: Start, there: Scene) -> Outcome:
-        return edge_outcome(frame, Estimate(start.pose, there), known.within(there), sensor)
+        at, within = Estimate(start.pose, there), known.within(there)
+        found = edge_outcome(frame, at, within, sensor)
+        soft = not is_sharp(there) and not is_clipped(frame, at)
+        return unless_disc(found, frame, at, within, sensor) if soft else found
 
     return answered(frame, scene, reference, known, sensor, localized)
 

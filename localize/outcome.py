@@ -36,6 +36,10 @@ WRONG_NOISE: Final = (
     "the frame's noise does not grow with its light as the scene's sensor says: its values have gamma (srgb8, or"
     " recorded), or its read_noise is told too small"
 )
+DISC_UNDER_IT: Final = (
+    "an optic disc about as large as the patch lies under it, and its rim may pass for the light's end: give a "
+    "reference frame without spotlights"
+)
 #: reasons of the published methods
 NOTHING_FOUND: Final = "nothing found: no patch stands out of the background"
 NO_LIGHT: Final = "no light of a spotlight: nothing is twice as bright as its surroundings"

@@ -8,6 +8,7 @@ spotlights, or a sequence over the same retina, takes its place as far as it is 
 from __future__ import annotations
 
 from conespot.localize.cone import edge_outcome
+from conespot.localize.disc.fit import unless_disc
 from conespot.localize.doubt import answered, noise_of
 from conespot.localize.edge.fit import is_clipped, is_sharp
 from conespot.localize.field.fit import fit_patch
@@ -48,8 +49,9 @@ def patch_outcome(
     fit = fit_patch(frame, start, knowns, noise, reference)
     if isinstance(fit, LocalizationFailure):
         return fit
-    return judged(
+    found = judged(
         fit.estimate, fit.covariance, start.scene, fit.knowns,
         misfit=fit.misfit, covered=fit.lit_share, settled=fit.settled,
         suspicions=lambda: fit.suspicions(start.scene),
     )  # fmt: skip
+    return found if reference is not None else unless_disc(found, frame, start, knowns, noise)

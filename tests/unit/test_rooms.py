@@ -25,6 +25,8 @@ INNER_ROOMS = {
     "start": {"model"},
     "edge": {"model"},
     "field": {"model"},
+    # begins where a start would, on rings
+    "disc": {"model", "start"},
     # takes the albedo out as the field's fit does, and is a start as well
     "spot": {"model", "field", "start"},
     "theory": {"model"},
