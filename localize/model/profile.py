@@ -18,6 +18,8 @@ from numpy.typing import NDArray
 from conespot.scene.beam import Beam, CyclesBeam, HardBeam, LinearBeam, TabulatedBeam
 
 Array = NDArray[np.float64]
+#: knots from which on it takes longer to look at one after the other
+_FEW = 4
 
 
 @dataclass(frozen=True)
@@ -89,13 +91,13 @@ class Profile:
         mean[w > self.knots[-1] + reach] = self.coefficients[-1, 0]
         near = np.flatnonzero((w >= self.knots[0] - reach) & (w <= self.knots[-1] + reach))
         a, p, q, r = w[near], px[near], py[near], reach[near]
-        piece = np.searchsorted(self.knots, a - r, side="right")
-        within = piece == np.searchsorted(self.knots, a + r, side="right")
+        piece = self._pieces(a - r)
+        within = piece == self._pieces(a + r)
         inside, at = near[within], piece[within] - 1
         # a pixel inside one piece: of a cubic's Taylor series only the second derivative adds to the mean
         spread = (np.square(p[within]) + np.square(q[within])) / 6.0
-        x = a[within] - self.knots[at]
-        c = self._cubic[:, at]
+        x = a[within] - self.knots.take(at)
+        c = self._cubic.take(at, axis=1)
         mean[inside] = ((c[3] * x + c[2]) * x + c[1]) * x + c[0] + spread * (2.0 * c[2] + 6.0 * c[3] * x)
         slope[inside] = (3.0 * c[3] * x + 2.0 * c[2]) * x + c[1] + spread * 6.0 * c[3]
         across = ~within
@@ -150,8 +152,14 @@ class Profile:
         """Coefficients of the pieces, constant first `[4, S]`."""
         return np.pad(self.coefficients, ((0, 0), (0, 4 - self.coefficients.shape[1]))).T
 
+    def _pieces(self, w: Array) -> NDArray[np.intp]:
+        """How many knots are not beyond w `[N]`."""
+        if len(self.knots) < _FEW:
+            return np.asarray(sum((w >= knot).astype(np.intp) for knot in self.knots.tolist()))
+        return np.searchsorted(self.knots, w, side="right")
+
     def _piecewise(self, coefficients: Array, w: Array) -> Array:
-        if len(self.knots) < 3:
+        if len(self.knots) < _FEW:
             found = np.zeros_like(w)
             for knot, piece in zip(self.knots.tolist(), coefficients.tolist(), strict=True):
                 np.copyto(found, _polynomial(piece, w - knot), where=w >= knot)

@@ -110,7 +110,7 @@ def find_rings(
         away = (x - column) ** 2 + (y - row) ** 2
         for j, radius in enumerate(radii):
             if 1.0 / START.one_ring_size < radius / radii[k] < START.one_ring_size:
-                votes[j][away < (START.one_ring_place * max(radius, radii[k])) ** 2] = -1.0
+                np.copyto(votes[j], -1.0, where=away < (START.one_ring_place * max(radius, radii[k])) ** 2)
     return found
 
 

@@ -245,12 +245,9 @@ def _settle(overview: Overview, scene: Scene, pose: Pose, *, thorough: bool) -> 
         seen = rays_across(overview, scene, estimate.pose, thorough=thorough)
         if not seen:
             return None
-        points, worth = (np.concatenate(parts) for parts in zip(*(rays.found() for rays in seen), strict=True))
-        # a spotlight of which the frame shows nothing where it should be denies the whole pose
-        lit = min(support([rays])[0] for rays in seen) > START.dark
-        here = Start(estimate.pose, *support(seen), grain=overview.step) if lit else None
         if turn == START.turns:
-            return here
+            break
+        points, worth = (np.concatenate(parts) for parts in zip(*(rays.found() for rays in seen), strict=True))
         spots = np.concatenate([np.full(len(r.total), r.spotlight, np.intp) for r in seen])
         sizes = np.concatenate([np.linalg.norm(r.ends - r.middle, axis=1) for r in seen])
         keep = worth > START.ray_worth
@@ -259,9 +256,11 @@ def _settle(overview: Overview, scene: Scene, pose: Pose, *, thorough: bool) -> 
             return None
         shift = float(np.linalg.norm(moved_to.pose.apex - estimate.pose.apex))
         if shift < START.still_mm and abs(moved_to.pose.roll - estimate.pose.roll) < START.still_rad:
-            return here
+            break
         estimate = moved_to
-    return None
+    # a spotlight of which the frame shows nothing where it should be denies the whole pose
+    lit = min(support([rays])[0] for rays in seen) > START.dark
+    return Start(estimate.pose, *support(seen), grain=overview.step) if lit else None
 
 
 def _towards(estimate: Estimate, pixels: Array, spots: NDArray[np.intp], worth: Array, sizes: Array) -> Estimate | None:
