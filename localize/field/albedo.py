@@ -11,6 +11,7 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
+from numpy.lib.stride_tricks import sliding_window_view
 from numpy.typing import NDArray
 from scipy.fft import fftfreq, rfftfreq
 from scipy.linalg import cho_solve, cholesky
@@ -91,18 +92,21 @@ class Modes:
         """
         ny, nx = len(self.along_y), len(self.along_x)
         t = self.twice_y @ weights @ self.twice_x.T
-        i, j = np.arange(ny), np.arange(nx)
+        i = np.arange(ny)
         rows = t[np.abs(i[:, None] - i)] + t[i[:, None] + i]  # [ny, ny, 2 nx]
-        both = rows.take(np.abs(j[:, None] - j), axis=2)  # [ny, ny, nx, nx]
-        both += rows.take(j[:, None] + j, axis=2)
-        both *= self._norms
-        return np.asarray(both.transpose(0, 2, 1, 3).reshape(ny * nx, ny * nx))
+        mirrored = np.concatenate([rows[..., nx - 1 : 0 : -1], rows[..., :nx]], axis=2)
+        less = sliding_window_view(mirrored, nx, axis=2)[..., ::-1]  # j - l, in the place of j and l
+        more = sliding_window_view(rows, nx, axis=2)[:, :, :nx]  # j + l
+        found = np.empty((ny, nx, ny, nx))
+        np.add(less, more, out=found.transpose(0, 2, 1, 3))
+        found *= self._norms
+        return found.reshape(ny * nx, ny * nx)
 
     @cached_property
     def _norms(self) -> Array:
-        """Of the products of modes, in the order in which `gram` makes them."""
-        y, x = (np.outer(norm, norm) for norm in (_norms(len(self.along_y)), _norms(len(self.along_x))))
-        return 0.25 * np.multiply.outer(y, x)
+        """Of the products of modes `[ny, nx, ny, nx]`."""
+        norms = np.multiply.outer(_norms(len(self.along_y)), _norms(len(self.along_x)))
+        return 0.25 * np.multiply.outer(norms, norms)
 
     def learnt(self, coefficients: Array, variances: Array, amplitudes: Array) -> Array:
         """The octaves' amplitudes that MacKay's fixed point makes of the modes' posterior means and variances.
