@@ -74,7 +74,6 @@ class Nuisances:
             self.white = rest(residual[steady], variance[steady], self.white)
         variance = variance + self.white**2
         whitened = residual / np.sqrt(variance)
-        self.misfit = rms(whitened[use])
         self._left = whitened, variance, use
         worth = use.astype(float)
         if shown.clipped.any():
@@ -84,8 +83,7 @@ class Nuisances:
         self.weights = worth / variance * student_weights(whitened)
         self._share = share = g / incident
         self.rows = np.concatenate([share * rows, (share * light)[None]])
-        self.residual = residual
-        self.follows = follows(self.weights * np.square(self.rows[-1]), whitened)
+        self.residual, self._whitened = residual, whitened
 
     def along(self, rows: Array) -> Nuisances:
         """The same as it was evaluated, with the light's derivatives `rows` `[P, N]` by other shared parameters."""
@@ -97,6 +95,17 @@ class Nuisances:
         """Take what bins show over the model's brightness `[N]` for the albedo."""
         self.level, self.levels = first_levels(self.shown, self.strips, brightness, len(self.spread))
         self.slow, self.slow_spread = np.zeros(len(self.strips.slow[0])), float(self.spread[1])
+
+    @property
+    def misfit(self) -> float:
+        """Rms of the residuals where they were last evaluated, outliers cut, over what the model expects."""
+        whitened, _, use = self._left
+        return rms(whitened[use])
+
+    @property
+    def follows(self) -> float:
+        """How far the fit follows its data there, over least squares of the same weights."""
+        return follows(self.weights * np.square(self.rows[-1]), self._whitened)
 
     @property
     def likelihood(self) -> float:
