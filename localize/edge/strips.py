@@ -124,7 +124,8 @@ def score_covariance(strips: Strips, scores: Array, parts: Array) -> Array:
         along[1:] *= np.cumprod(np.where(turned, -1.0, 1.0), axis=0)[:, None]
         power = _power(np.einsum("sp,spj->js", scores[turn] / scale, along) / size.T)
         waves = np.fft.rfft(along * size[:, None], axis=0) * np.sqrt(power).T[:, None]
-        total += np.real(np.einsum("mpj,mqj->pq", waves, waves.conj())) / len(size)
+        each = np.ascontiguousarray(waves.transpose(1, 0, 2)).reshape(len(total), -1).view(np.float64)
+        total += each @ each.T / len(size)
     return np.asarray(total * np.outer(scale, scale))
 
 

@@ -53,7 +53,8 @@ class Piece:
         self._albedo = np.zeros(plane.signal.shape)  # log, beside the template
         self._fresh = True
         self._lit = np.zeros(plane.signal.shape, bool)
-        self.misfit = np.inf
+        # residuals, the variances that the model expects of them, and which are used, as last linearized
+        self._left = np.zeros(0), np.zeros(0), np.zeros(0, bool)
 
     def begin(self, light: Array) -> float:
         """Take the surroundings' albedo for all there is, and tell the log gain that the brighter half then shows."""
@@ -95,6 +96,12 @@ class Piece:
         )  # fmt: skip
         self._fresh = False
 
+    @property
+    def misfit(self) -> float:
+        """Rms of the residuals over what the model expects, outliers cut; infinite before there are any."""
+        residual, variance, use = self._left
+        return rms((residual / np.sqrt(variance))[use])
+
     def unclipped(self) -> float:
         """Share of the window's lit bins that can be measured."""
         lit = self._lit & self._seen
@@ -125,7 +132,7 @@ class Piece:
         if not self._fresh:
             inner = self._usable & (full > FIELD.lit * light.max(initial=0.0))
             self.roughness, local = self.roughness.measured(residual, sensor, use, inner)
-        self.misfit = rms((residual / np.sqrt(sensor + local))[use])
+        self._left = residual, sensor + local, use
         jacobian = np.zeros((size + len(self._chroma), full.size))
         share = gain / brightness.ravel()[bins.lit]
         jacobian[: len(rows), bins.lit] = share * rows
