@@ -66,9 +66,9 @@ class DeepLight:
     by_length: Array  #: its derivative by the logarithm of the kernel's length `[N]`
 
     def after(self, step: Array, longer: float) -> DeepLight:
-        """The same after a step of the pose's parameters and of the length, to first order."""
-        moved = self.value + step @ self.jacobian[: len(step)] + longer * self.by_length
-        return DeepLight(moved, self.jacobian, self.by_length)
+        """The same, with the pose's rows alone, after a step of its parameters and of the length, to first order."""
+        by_pose = self.jacobian[: len(step)]
+        return DeepLight(self.value + step @ by_pose + longer * self.by_length, by_pose, self.by_length)
 
     def plus(self, share: float, near: Light, by_length: Array) -> DeepLight:
         """The same with a share of the kernel whose light is `near`."""

@@ -189,6 +189,10 @@ def test_near_its_last_place_deep_light_goes_on_in_proportion():
     glow.light(here, (), sharp(sight, here))
     whole = glow_at(rim, there, near=here).value
     assert glow.light(there, (), sharp(sight, there))[0].value == pytest.approx(whole, rel=0.01)
+    free = Knowns(half_angle_sigma_deg=None).free
+    wider = light(sight, pose, scene, here.profile, changes=here.beam_changes(free))
+    assert len(glow.light(here, free, wider)[0].jacobian) == 6
+    assert len(glow.light(there, (), sharp(sight, there))[0].jacobian) == 5
 
 
 @pytest.mark.parametrize(
