@@ -53,7 +53,6 @@ class Stage:
     outer: float
     iterations: int  #: at most
     enough: float  #: a step that is shorter ends them [sigmas of uncorrelated residuals]
-    sharp: bool  #: whether the edge is a step
 
 
 @dataclass(frozen=True)
@@ -200,7 +199,6 @@ def fit_band(
     band = Ribbon.along(frame, estimate, side=side, inner=stage.inner, outer=stage.outer)
     if band is None:
         return LocalizationFailure(COVERED)
-    band = replace(band, strips=replace(band.strips, sloping=not stage.sharp))
     if reference is not None:
         band = band.told(reference, nominal, noise)
     irradiance = ambient_irradiance(band.sight, nominal)

@@ -150,7 +150,7 @@ def _stage(level: Level, patch: _Patch, width: float, *, last: bool) -> Stage:
         # bins half as wide as the blur see all of it
         side = max(side, int(EDGE.bins_a_width * width))
     reach = EDGE.widths * width / side
-    return Stage(side, level.inner + reach, level.outer + reach, level.iterations, EDGE.enough[last], patch.sharp)
+    return Stage(side, level.inner + reach, level.outer + reach, level.iterations, EDGE.enough[last])
 
 
 def _throughout(frame: Frame, start: Estimate, knowns: Knowns, size: float) -> SaturatedFit | LocalizationFailure:

@@ -149,8 +149,8 @@ class Nuisances:
 
     @property
     def slow_scatter(self) -> float:
-        """Rms of the levels that vary slowly; 0 where none do."""
-        return float(np.sqrt(np.mean(np.square(self._slow_levels @ self.strips.waves)))) if self.strips.sloping else 0.0
+        """Rms of the levels that vary slowly."""
+        return float(np.sqrt(np.mean(np.square(self._slow_levels @ self.strips.waves))))
 
     @property
     def _slow_levels(self) -> Array:
@@ -169,9 +169,7 @@ class Nuisances:
         found = np.sqrt(np.square(self.levels).sum(axis=0) / np.maximum(known, 1.0))
         self.spread = np.clip(found, self.smallest, EDGE.widest * self.spread)
         # albedo has no direction: across the outline it changes as much as along
-        levels = self.levels[:, 0]
-        if self.strips.slow_levels:
-            levels = levels + self._learn_slow_levels(part) @ self.strips.waves
+        levels = self.levels[:, 0] + self._learn_slow_levels(part) @ self.strips.waves
         if self.strips.odds is not None:
             # nor do a strip's own bins tell its slope where the step is low; and odds vary as the albedo does
             self.spread[1:] = np.maximum(self.spread[1:], [self.strips.gradient(levels), self.spread[0]])

@@ -12,8 +12,9 @@ Array = NDArray[np.float64]
 WIDTH = 2.0  # of a strip along the outline [bins]
 #: harmonics of the outline that the pose changes: what a fit leaves of them says nothing of what they were
 _FITTED = 3
-#: harmonics above which neighbouring strips err independently; the last: all do
-_KNEES = np.array([1.0, 2.0, 4.0, 8.0, 16.0, 32.0, np.inf])
+#: harmonics above which what neighbouring strips share falls, with their square, and with their fourth power
+_KNEES = np.array([1.0, 2.0, 4.0, 8.0, 16.0, 32.0])
+_STEEP = np.array([1.0, 2.0, 4.0, 8.0])
 
 
 @dataclass(frozen=True)
@@ -27,7 +28,6 @@ class Strips:
     #: how the log light changes with the log odds of the light from under the retina `[N]`, where there is any: a strip
     #: has odds of its own, since what lies before the pigment reflects and what lies behind it are not one albedo
     odds: Array | None = None
-    sloping: bool = False  #: whether the edge is a slope rather than a step
 
     @property
     def count(self) -> int:
@@ -47,18 +47,17 @@ class Strips:
     def slow(self) -> tuple[NDArray[np.intp], Array]:
         """What varies with harmonics 0 to 2 around each outline, the pose's: slopes, levels and odds.
 
-        Which of a strip's own quantities each is `[Q]`, and how much of it the strips have `[Q, S]`: `5 T` of them,
-        along a slope `10 T` and with odds `15 T`. Without them a step in the light is so high that what a prior of
-        strips which know nothing of each other leaves of smooth levels moves no edge. A slope it moves: to such a prior
-        one wave of levels is as unlikely as noise of their size, and a turned axis likelier.
+        Which of a strip's own quantities each is `[Q]`, and how much of it the strips have `[Q, S]`: `10 T` of them,
+        with odds `15 T`. To a prior of strips which know nothing of each other one wave of levels is as unlikely as
+        noise of their size, and a turned axis likelier: it left a part of a living retina's smooth levels to the edge.
         """
         kinds = np.array([1, 0, 2][: 1 + self.slow_levels], np.intp)
         return np.repeat(kinds, len(self.waves)), np.tile(self.waves, (len(kinds), 1))
 
     @property
     def slow_levels(self) -> int:
-        """How many quantities beside the slopes vary slowly: none, levels, or levels and odds."""
-        return int(self.sloping) if self.odds is None else 2
+        """How many quantities beside the slopes vary slowly: levels, or levels and odds."""
+        return 1 if self.odds is None else 2
 
     def gradient(self, levels: Array) -> float:
         """Rms by which levels `[S]` of width `WIDTH` change along the outlines [1/bin]."""
@@ -138,8 +137,8 @@ def _edges(count: int) -> NDArray[np.intp]:
 def _power(series: Array) -> Array:
     """The power spectra of series around the outline `[D, n]` at `[D, n // 2 + 1]` harmonics, smooth in frequency.
 
-    1 for independent values of sigma 1; both signs of a frequency count. White noise and a part that falls above some
-    frequency, as what an albedo does to edges does: the mean over such spectra, each by its likelihood (Whittle's).
+    1 for independent values of sigma 1; both signs of a frequency count. White noise and a part that falls, as what an
+    albedo does to edges does: the mean over such spectra, each by its likelihood (Whittle's).
     """
     count = series.shape[1]
     harmonic = np.arange(count // 2 + 1)
@@ -152,7 +151,7 @@ def _power(series: Array) -> Array:
     number = np.diff(edges)
     observed = (np.add.reduceat(raw[:, : edges[-1]], edges[:-1], axis=1) / number)[:, None]
     middle = 0.5 * (edges[1:] + edges[:-1] - 1)
-    shape = 1.0 / (1.0 + np.square(middle / _KNEES[:, None]))
+    shape = _laws(middle)
     both = np.stack([np.ones_like(shape), shape], axis=1)
     amounts = 0.5 * observed.mean(axis=2)[..., None] / both.mean(axis=2)
     sides = np.empty((*amounts.shape[:2], 2, len(number)))  # what is seen, and the model, weighed by that
@@ -163,10 +162,21 @@ def _power(series: Array) -> Array:
         seen, expected = np.moveaxis(sides @ both.transpose(0, 2, 1), 2, 0)
         amounts = amounts * seen / expected
     cost = np.sum(number * (np.log(model) + observed / model), axis=2)
-    # before any frame is seen, that strips err alone is as likely as all knees together; and a second parameter has
+    # before any frame is seen, that strips err alone is as likely as all laws together; and a second parameter has
     # to be worth what it can fit of noise (Schwarz, Estimating the dimension of a model, Annals of Statistics 6, 1978)
-    cost = cost + np.isfinite(_KNEES) * (0.5 * np.log(number.sum()) + np.log(len(_KNEES) - 1.0))
+    cost[:, :-1] += 0.5 * np.log(number.sum()) + np.log(len(shape) - 1.0)
     share = np.exp(cost.min(axis=1, keepdims=True) - cost)
     white, red = np.moveaxis(amounts, 2, 0) * share / share.sum(axis=1, keepdims=True)
-    smooth = white.sum(axis=1)[:, None] + red @ (1.0 / (1.0 + np.square(harmonic / _KNEES[:, None])))
+    # a law that is seen from the third harmonic on tells nothing of how much more the mean has than the first one
+    smooth = white.sum(axis=1)[:, None] + red @ _laws(np.maximum(harmonic, 1))
     return np.asarray(twice * np.maximum(smooth, 1e-9))
+
+
+def _laws(harmonic: NDArray[np.generic]) -> Array:
+    """How the power that neighbouring strips share may fall with the `harmonic` `[M]`; the last, not at all `[L, M]`.
+
+    A smooth albedo's falls so steeply that the harmonics which the fit takes away have most of it.
+    """
+    squared = 1.0 / (1.0 + np.square(harmonic / _KNEES[:, None]))
+    fourth = 1.0 / np.square(1.0 + np.square(harmonic / _STEEP[:, None]))
+    return np.concatenate([squared, fourth, np.ones((1, len(harmonic)))])
