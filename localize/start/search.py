@@ -128,7 +128,7 @@ def _near_the_wall(whole: Overview, scene: Scene) -> Iterator[Start]:
 
 
 def _instruments(overview: Overview, scene: Scene, rings: Sequence[Ring], given: Sequence[Start]) -> Iterator[Start]:
-    """Starts on rings elsewhere that would be convincing by themselves: another instrument's spotlight."""
+    """Starts on rings elsewhere, convincing by themselves and not faint as a disc: another instrument's spotlight."""
     taken = [circle for start in given for circle in _circles(start.pose, scene)]
     for ring in rings:
         if any(float(np.linalg.norm(ring.centre - middle)) < max(ring.radius, radius) for middle, radius in taken):
@@ -140,7 +140,8 @@ def _instruments(overview: Overview, scene: Scene, rings: Sequence[Ring], given:
             start = _settle(overview, scene, pose, thorough=False)
             if start is None or not start.stands_out or start.explained <= START.convincing:
                 continue
-            if all(_differ(start.pose, other.pose) for other in given):
+            bright = start.evidence >= START.touching * given[0].evidence
+            if bright and all(_differ(start.pose, other.pose) for other in given):
                 yield start
                 return
 

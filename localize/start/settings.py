@@ -166,7 +166,8 @@ class StartSettings:
     faintest: float = 0.3
     least_share: float = 0.25
     #: share of the best start's evidence with which another one may be right: after a convincing one, and otherwise
-    #: where the two touch, so that each hides part of the other's outline, or lie apart; and how many are fitted
+    #: where the two touch, so that each hides part of the other's outline, or lie apart; and how many are fitted. With
+    #: less than the least of these no ring is another instrument's patch
     as_good: float = 0.8
     touching: float = 0.25
     apart: float = 0.5
