@@ -37,8 +37,9 @@ _MATERIAL = {
     "edge": (0.01, 1.0),
     TRANSFER: (0.9, 5.0),  # of the mistake: under right gamma in 8 bits without noise 0.6 is found
 }
-#: the same of the wall's shape: least change of all semi-axes together [mm], and most sigmas of a population's
-_SHAPE_MATERIAL_MM, _SHAPE_SIGMAS = 0.02, 5.0
+#: the same of the wall's shape: least change of all semi-axes together [mm]. No change is too large: what no shape
+#: explains contradicts the one that was told no less (a rig turned into its neighbours' places, 0.24 mm off)
+_SHAPE_MATERIAL_MM = 0.02
 #: least width of what a blur varies by [mm]
 _UNEVEN_MATERIAL_MM = 1.5e-3
 
@@ -141,13 +142,14 @@ def _of_wall(score: Array, left: Array, variance: Array, whole: Array) -> float:
     """The score of all semi-axes `[3]` together, as one of one quantity would be; 0 where it does not matter.
 
     Twice the logarithm of how much likelier a shape out of a population makes the score than the one that was told, but
-    for the prior odds: directions in which a frame does not show the shape then count for nothing.
+    for the prior odds: directions in which a frame does not show the shape then count for nothing. Its square is at
+    most a chi-squared of three degrees under the right shape.
     """
     variance = variance + np.diag(_LEFT * whole)
     prior = SEMI_AXES_SIGMA_MM**2 * np.eye(len(score))
     possible = variance + left @ prior @ left
     told, drawn = (float(score @ np.linalg.solve(v, score)) for v in (variance, possible))
     step = prior @ left @ np.linalg.solve(possible, score)
-    if float(np.linalg.norm(step)) < _SHAPE_MATERIAL_MM or drawn > _SHAPE_SIGMAS**2:
+    if float(np.linalg.norm(step)) < _SHAPE_MATERIAL_MM:
         return 0.0
     return math.sqrt(max(told - drawn, 0.0))

@@ -14,9 +14,10 @@ from conespot.localize.decoding import decoded_amiss
 from conespot.localize.doubt import noise_of
 from conespot.localize.image import Frame
 from conespot.localize.model.knowns import Knowns
+from conespot.localize.model.suspicion import WALL, scores
 from conespot.localize.outcome import BELOW_BLACK, COMPRESSED, NO_LIGHT, OTHER_LIGHT, WRONG_NOISE
 from conespot.localize.start.search import NOTHING, TWO_PLACES
-from conespot.localize.verdict import WRONG_BEAM, WRONG_TRANSFER, WRONG_WALL
+from conespot.localize.verdict import VERDICT, WRONG_BEAM, WRONG_TRANSFER, WRONG_WALL
 from conespot.scene import InputError, Scene
 from conespot.scene.beam import CyclesBeam, HardBeam
 from conespot.scene.camera import Camera
@@ -135,6 +136,15 @@ def test_three_spotlights_notice_that_the_retina_has_another_shape_and_keep_the_
     assert found.reason == WRONG_WALL
     free = locate(image, mean, "cone", noise=NOISE, knowns=Knowns(semi_axes_sigma_mm=SEMI_AXES_SIGMA_MM))
     assert free, free.reason
+
+
+def test_a_wall_that_no_shape_of_the_population_explains_is_doubted_no_less():
+    names = ["retina_width", "retina_height", "retina_length"]
+    information = np.diag([1.0, 1e4, 1e4, 1e4])
+    for off_mm, doubted in ((0.01, False), (0.5, True), (5.0, True)):
+        gradient = information @ np.array([0.0, off_mm, 0.0, 0.0])
+        found = scores(names, gradient, information, information, 1)[WALL]
+        assert (found > VERDICT.suspicious_wall) == doubted
 
 
 def test_a_sensor_of_few_bits_is_white_where_they_end_and_rounds_by_their_steps(soft):
