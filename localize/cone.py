@@ -38,10 +38,7 @@ def cone(
     sensor = noise_of(frame, noise)
 
     def localized(start: Start, there: Scene) -> Outcome:
-        at, within = Estimate(start.pose, there), known.within(there)
-        found = edge_outcome(frame, at, within, sensor)
-        soft = not is_sharp(there) and not is_clipped(frame, at)
-        return unless_disc(found, frame, at, within, sensor) if soft else found
+        return edge_outcome(frame, Estimate(start.pose, there), known.within(there), sensor)
 
     return answered(frame, scene, reference, known, sensor, localized)
 
@@ -53,7 +50,12 @@ def edge_outcome(
     if is_spot(start):
         return spot_outcome(frame, start, knowns, noise)
     fit = fit_edge(frame, start, knowns, noise, reference)
-    return fit if isinstance(fit, LocalizationFailure) else judged_edge(fit, start.scene)
+    if isinstance(fit, LocalizationFailure):
+        return fit
+    found = judged_edge(fit, start.scene)
+    if is_sharp(start.scene) or is_clipped(frame, start):
+        return found
+    return unless_disc(found, frame, replace(start, scene=fit.estimate.scene), knowns, noise)
 
 
 def judged_edge(fit: EdgeFit, scene: Scene) -> Outcome:

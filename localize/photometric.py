@@ -7,6 +7,8 @@ spotlights, or a sequence over the same retina, takes its place as far as it is 
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 from conespot.localize.cone import edge_outcome
 from conespot.localize.disc.fit import unless_disc
 from conespot.localize.doubt import answered, noise_of
@@ -54,4 +56,6 @@ def patch_outcome(
         misfit=fit.misfit, covered=fit.lit_share, settled=fit.settled,
         suspicions=lambda: fit.suspicions(start.scene),
     )  # fmt: skip
-    return found if reference is not None else unless_disc(found, frame, start, knowns, noise)
+    if reference is not None:
+        return found
+    return unless_disc(found, frame, replace(start, scene=fit.estimate.scene), knowns, noise)

@@ -36,7 +36,10 @@ _SIZE = 5
 
 
 def unless_disc(outcome: Outcome, frame: Frame, start: Estimate, knowns: Knowns, noise: NoiseModel) -> Outcome:
-    """The outcome of a fit to a soft patch near a start, refused where a disc passes for the light."""
+    """The outcome of a fit to a soft patch near a start, refused where a disc passes for the light.
+
+    The start's scene has what the fit has found: of a blur that nobody told a scene without would leave a ring.
+    """
     if isinstance(outcome, Localization) and passes_for_light(frame, start, knowns, noise):
         return LocalizationFailure(DISC_UNDER_IT)
     return outcome

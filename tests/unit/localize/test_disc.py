@@ -4,9 +4,10 @@ import math
 
 import numpy as np
 import pytest
-from photographs import NOISE, fundus, photograph, scene_of
+from photographs import NOISE, READ, WHITE, fundus, photograph, scene_of
+from scipy.ndimage import gaussian_filter
 
-from conespot.localize import Knowns, Localization, locate
+from conespot.localize import Knowns, Localization, SensorNoise, locate
 from conespot.localize.disc.rings import find_round
 from conespot.localize.disc.step import Disc
 from conespot.localize.outcome import DISC_UNDER_IT
@@ -40,6 +41,18 @@ def test_a_disc_about_as_large_as_a_soft_patch_under_it_is_refused(times, beside
         assert isinstance(found, Localization)
         sigma = math.sqrt(float(np.trace(found.covariance[:3, :3])))
         assert np.linalg.norm(found.apex_mm - pose.apex) < 6.0 * sigma + 0.05
+
+
+def test_a_blur_that_nobody_told_of_is_taken_for_no_disc():
+    scene = scene_of(CyclesBeam(), resolution=400)
+    pose = scene.pose(np.array([1.0, 0.5, 5.0]))
+    electrons = 50.0 * gaussian_filter(photograph(scene, pose, noise=False) / 4095.0, 1.8) * WHITE
+    noisy = np.random.default_rng(0).normal(electrons, np.sqrt(electrons + READ**2))
+    image = np.round(noisy / (50.0 * WHITE) * 4095.0).clip(0.0, 4095.0).astype(np.uint16)
+    noise = SensorNoise(levels=4095, electrons=50.0 * WHITE, read=READ)
+    found = locate(image, scene, "photometric", knowns=Knowns(0.05), noise=noise)
+    assert isinstance(found, Localization)
+    assert np.linalg.norm(found.apex_mm - pose.apex) < 0.01
 
 
 def test_a_discs_step_has_the_derivatives_that_it_says():
