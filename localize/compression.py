@@ -7,17 +7,15 @@ Trans. Image Processing 12 (2003). Compression moves edges by more than any sens
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import cache
 
 import cv2
 import numpy as np
 from numpy.typing import NDArray
 
 from conespot.localize.image import AnyImage
-from conespot.scene.jpeg import luminance_steps
+from conespot.scene.jpeg import BLOCK, cosines, luminance_steps
 
 Array = NDArray[np.float64]
-_BLOCK = 8
 
 
 @dataclass(frozen=True)
@@ -43,14 +41,14 @@ def compressed(pixels: AnyImage, rows: slice, columns: slice) -> bool:
     """Whether a part of a frame of eight bits shows the rounding of a JPEG; False for other types of pixels."""
     if pixels.dtype != np.uint8:
         return False
-    top, left = (-(-part.start // _BLOCK) * _BLOCK for part in (rows, columns))
-    height, width = ((part.stop - start) // _BLOCK for part, start in ((rows, top), (columns, left)))
+    top, left = (-(-part.start // BLOCK) * BLOCK for part in (rows, columns))
+    height, width = ((part.stop - start) // BLOCK for part, start in ((rows, top), (columns, left)))
     if height < 1 or width < 1:
         return False
-    seen = pixels[top : top + height * _BLOCK, left : left + width * _BLOCK]
+    seen = pixels[top : top + height * BLOCK, left : left + width * BLOCK]
     luma = cv2.cvtColor(seen, cv2.COLOR_RGB2YCrCb)[..., 0] if seen.ndim == 3 else seen
-    blocks = luma.reshape(height, _BLOCK, width, _BLOCK).transpose(0, 2, 1, 3).reshape(-1, _BLOCK, _BLOCK)
-    wave = _cosines()
+    blocks = luma.reshape(height, BLOCK, width, BLOCK).transpose(0, 2, 1, 3).reshape(-1, BLOCK, BLOCK)
+    wave = cosines()
     return agreement(wave @ blocks.astype(float) @ wave.T) > COMPRESSION.agreement
 
 
@@ -69,12 +67,3 @@ def agreement(frequencies: Array) -> float:
             phases = found[told] / steps[told]
             best = max(best, float(np.sum(np.cos(2.0 * np.pi * phases))) / float(np.sqrt(count / 2.0)))
     return best
-
-
-@cache
-def _cosines() -> Array:
-    """The orthonormal cosine transform of a block `[8, 8]`."""
-    order = np.arange(_BLOCK)[:, None]
-    wave = np.cos(np.pi * order * (np.arange(_BLOCK) + 0.5) / _BLOCK) * np.sqrt(2.0 / _BLOCK)
-    wave[0] /= np.sqrt(2.0)
-    return np.asarray(wave)

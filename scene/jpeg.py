@@ -1,10 +1,15 @@
-"""How much a JPEG's quantization rounds away."""
+"""What a JPEG's quantization rounds, and how much it rounds away."""
 
 from __future__ import annotations
 
 import math
+from functools import cache
 
 import numpy as np
+from numpy.typing import NDArray
+
+#: pixels along the side of a block
+BLOCK = 8
 
 #: quantization of luminance at quality 50, in rows of 8 frequencies (ITU-T T.81, Table K.1)
 _LUMINANCE = np.array(
@@ -41,3 +46,16 @@ def rounding_error(quality: int) -> float:
     3.9
     """
     return math.sqrt(float(np.mean(np.square(luminance_steps(quality)))) / 12.0)
+
+
+@cache
+def cosines() -> NDArray[np.float64]:
+    """The orthonormal cosine transform of a block's side `[8, 8]`.
+
+    >>> bool(np.allclose(cosines() @ cosines().T, np.eye(8)))
+    True
+    """
+    order = np.arange(BLOCK)[:, None]
+    wave = np.cos(np.pi * order * (np.arange(BLOCK) + 0.5) / BLOCK) * np.sqrt(2.0 / BLOCK)
+    wave[0] /= np.sqrt(2.0)
+    return np.asarray(wave)

@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 from conespot.localize.edge.moments import Eliminated, of_shared
 from conespot.localize.edge.nuisances import Nuisances, first_gain, gain_over
 from conespot.localize.edge.ribbon import Ribbon
+from conespot.localize.edge.rounding import Rounding
 from conespot.localize.edge.sandwich import EdgeFit
 from conespot.localize.edge.seen import Seen
 from conespot.localize.edge.settings import EDGE
@@ -193,8 +194,7 @@ def fit_band(
     Gain and spreads of the albedo start from those of the fit `before`, or from the band itself and a usual retina.
     With `tied` the axis stays on the RCM. A `reference` tells the albedo as far as it shows it.
     """
-    nominal, estimate, side = start.scene, start, stage.side
-    size = start.pose_size + len(knowns.free)
+    nominal, estimate, side, size = start.scene, start, stage.side, start.pose_size + len(knowns.free)
     used = replace(knowns, rcm_sigma_mm=0.0) if tied else knowns
     band = Ribbon.along(frame, estimate, side=side, inner=stage.inner, outer=stage.outer)
     if band is None:
@@ -213,6 +213,7 @@ def fit_band(
         per_bin = np.array([1.0, side / math.sqrt(before.channels[0].pixels), 1.0])[:each]
         begin = [(c.gain, c.spread * per_bin, c.told) for c in before.channels]
     smallest = np.array([EDGE.smallest, EDGE.smallest / (stage.inner + stage.outer), EDGE.smallest])[:each]
+    rounding, noise = Rounding.of(frame, band, noise)
     channels = [
         Nuisances(shown, band.strips, noise, side**2, gain, spread, smallest, told=told)
         for shown, (gain, spread, told) in zip(band.shown, begin, strict=True)
@@ -232,9 +233,13 @@ def fit_band(
         estimate = estimate.moved(step, knowns.free)
         for channel, part in zip(channels, parts, strict=True):
             channel.learn(part, _with_own(part, step))
+        if rounding is not None:
+            channels[0].shown = rounding.without(channels[0].model)
         length = float(step @ information @ step)
         if length < stage.enough**2 and turn >= 2:
             break
+    if rounding is not None:
+        information = rounding.lets_through(information, pj.T @ pj, channels[0])
     seen = Seen(band.sight, band.pixels, side, irradiance, shed)
     return BandFit(estimate, information, pj, step, band.covered, knowns, tuple(channels), seen)
 

@@ -98,6 +98,14 @@ class EdgeSettings:
     #: their place a fourth of a rim passed for seen at quality 90, and tips were up to 80 um off
     #: (`tests/unit/localize/test_doubt.py`); two of them leave 20 um, three 11
     ringing: float = 3.0
+    #: noise of a block's frequencies before they are rounded [codes], by which the rounding is expected. At 2 codes
+    #: errors are the same
+    code_noise: float = 1.0
+    #: share of a compression's rounding that stays noise where it is predicted: with 0.5 and 0.15 of
+    #: `test_ellipsoids_of_hard_edges_that_were_recorded_hold`'s 100 tips 85 and 83 are inside, with this 89
+    unpredicted: float = 0.3
+    #: least share of a displacement that rounding is taken to let through; seen are 0.6 (quality 75) to 0.9
+    least_through: float = 0.2
     #: bins on either side that are looked at. Not critical
     saturated_band: float = 5.0
     #: bins on either side within which lie those between dark and white. Half of it costs 17 %

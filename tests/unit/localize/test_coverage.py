@@ -1,8 +1,10 @@
 """What stated sigmas rest on, and whether 95 % ellipsoids hold 95 % of the tips; `benchmarks/coverage.py` asks more."""
 
 import math
+from dataclasses import replace
 from functools import lru_cache
 
+import cv2
 import numpy as np
 import pytest
 from photographs import AMBIENT, NOISE, PEAK, READ, WHITE, albedo, fundus, photograph, scene_of
@@ -10,8 +12,12 @@ from scipy.ndimage import gaussian_filter
 from scipy.stats import binom, chi2
 
 from conespot.localize import Localization, locate
+from conespot.localize.edge.ribbon import Ribbon
+from conespot.localize.edge.rounding import Rounding
 from conespot.localize.field.roughness import Roughness
 from conespot.localize.field.sandwich import rest_scatter
+from conespot.localize.image import Frame
+from conespot.localize.model.estimate import Estimate
 from conespot.localize.model.forward import ambient_irradiance, light
 from conespot.localize.model.profile import Profile
 from conespot.localize.model.residual import censored, incident_light, log_residuals
@@ -19,6 +25,7 @@ from conespot.localize.model.sight import look, window
 from conespot.localize.model.view import Shown
 from conespot.localize.theory.bounds import patch_pixels
 from conespot.scene.beam import CyclesBeam, HardBeam
+from conespot.scene.sensor import Linear, Recorded
 
 RCM_MM = 0.05
 
@@ -146,6 +153,53 @@ def test_a_hard_patch_that_is_clipped_lies_within_its_sigmas_however_bright_it_i
         assert square(found, pose) < 21.1  # 99.99 % of chi-squared of three degrees
         # small as it is, the patch is not held on the RCM that is told
         assert math.sqrt(float(found.covariance[3, 3])) > 1e-4
+
+
+RECORDER = Recorded(camera=Linear(bits=12), quality=85, range="limited")
+
+
+def recorded(signal, seed):
+    """A frame of eight bits that went through JPEG, of `signal` electrons."""
+    codes = np.round(RECORDER.code(brighter(signal, 0.8, seed) / 4095.0)).astype(np.uint8)
+    file = cv2.imencode(".jpg", codes, [cv2.IMWRITE_JPEG_QUALITY, RECORDER.quality])[1]
+    return cv2.imdecode(file, cv2.IMREAD_GRAYSCALE)
+
+
+def dark(scene, pose):
+    """Electrons over an even retina with a tenth of the ambient light."""
+    return electrons(scene, pose, None) - 0.9 * AMBIENT * ground(scene.camera.resolution)[1]
+
+
+def test_what_a_jpeg_rounds_at_the_foot_of_an_edge_is_predicted():
+    """It brightens the dark foot of a step all around, and moved tips along the axis."""
+    scene = scene_of(HardBeam(), resolution=500).model_copy(update={"sensor": RECORDER})
+    pose = scene.pose(np.array([1.0, 0.5, 4.0]))
+    signal = dark(scene, pose)
+    frame = Frame(recorded(signal, 0), RECORDER)
+    band = Ribbon.along(frame, Estimate(pose, scene), side=1, inner=5.0, outer=3.0)
+    rounding, _ = Rounding.of(frame, band, RECORDER.noise)
+    model = 0.8 * signal[band.at.row + band.cells[0], band.at.column + band.cells[1]] / WHITE
+    foot = (model > 0.003) & (model < 0.05)
+    seen, mended = (
+        RECORDER.code(np.maximum(shown.signal[foot], 0.0)) - RECORDER.code(model[foot])
+        for shown in (band.shown[0], rounding.without(model))
+    )
+    assert seen.mean() > 2.0
+    assert abs(mended.mean()) < 1.0
+    assert mended.std() < 0.7 * seen.std()
+
+
+@pytest.mark.slow
+def test_ellipsoids_of_hard_edges_that_were_recorded_hold():
+    scene, rng, squares = scene_of(HardBeam(), resolution=500), np.random.default_rng(6), []
+    noise = replace(RECORDER.noise, electrons=WHITE, read=READ)
+    for seed in range(100):
+        pose = scene.pose(rng.uniform((-1.5, -1.5, 3.0), (1.5, 1.5, 4.5)))
+        told = misinformed(scene, rng).model_copy(update={"sensor": RECORDER})
+        found = locate(recorded(dark(scene, pose), seed), told, "photometric", noise=noise)
+        assert found, found.reason
+        squares.append(square(found, pose))
+    assert holds(squares), np.mean(squares) / 3.0
 
 
 def holds(squares):
