@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import itertools
+import math
 from collections.abc import Callable, Iterable
 from dataclasses import replace
 
+import cv2
 import numpy as np
 
 from conespot.localize.compression import compressed
@@ -15,8 +17,16 @@ from conespot.localize.image import Frame, Reference
 from conespot.localize.model.estimate import Estimate
 from conespot.localize.model.knowns import Knowns
 from conespot.localize.model.noise import NoiseModel
-from conespot.localize.model.view import outlines
-from conespot.localize.outcome import COMPRESSED, GLOWS, OTHER_LIGHT, Localization, LocalizationFailure, Outcome
+from conespot.localize.model.view import outline, outlines
+from conespot.localize.outcome import (
+    COMPRESSED,
+    GLOWS,
+    OTHER_LIGHT,
+    OUTSHONE,
+    Localization,
+    LocalizationFailure,
+    Outcome,
+)
 from conespot.localize.spot.start import spot_start
 from conespot.localize.start.rings import Overview, find_rings
 from conespot.localize.start.search import NOTHING, Start, believed, find_starts
@@ -30,6 +40,10 @@ from conespot.scene.sensor import Recorded
 Localizes = Callable[[Start, Scene], Outcome]
 #: refusals of what the light of a patch looks like: what spoils all of a frame's values explains them better
 _OF_LIGHT = (MISFIT, WRONG_BEAM, WRONG_WALL, GLOWS)
+#: how far around a patch light may be its own, over its radius, and by what factor other light is far brighter: a
+#: disc's albedo is a few times that of what surrounds it
+_BESIDE = 1.5
+_FAR_BRIGHTER = 8.0
 #: two blocks of a JPEG [px]
 _BLOCKS = 16.0
 
@@ -49,6 +63,8 @@ def answered(
         return LocalizationFailure(OTHER_LIGHT) if ring.votes > START.round else outcome
     if pose is None or (isinstance(outcome, LocalizationFailure) and outcome.reason not in _OF_LIGHT):
         return outcome
+    if isinstance(outcome, Localization) and _outshone(frame, Estimate(pose, outcome.seen_in(scene)), reference):
+        return LocalizationFailure(OUTSHONE)
     against = _against(frame, Estimate(pose, scene), noise)
     return outcome if against is None else LocalizationFailure(against)
 
@@ -96,6 +112,29 @@ def _answered(scene: Scene, starts: Iterable[Start], localized: Localizes) -> tu
     if isinstance(outcome, Localization):
         return outcome, Pose(outcome.apex_mm, outcome.axis, outcome.roll or 0.0)
     return outcome, tried[0].pose if tried else None
+
+
+def _outshone(frame: Frame, found: Estimate, reference: Reference | None) -> bool:
+    """Whether a place as wide as half a patch, beside all of them, is far brighter than the brightest patch.
+
+    A retina's disc in ambient light passes for a hard patch with a wide blur, where the spotlight itself was refused.
+    """
+    overview = Overview.of(frame, reference)
+    own = overview.light if overview.reference is None else overview.light - overview.reference
+    every = [outline(found, k) / overview.step for k in range(len(found.scene.spotlights))]
+    middles = [(points.mean(axis=0), float(np.mean(np.ptp(points, axis=0))) / 2.0) for points in every if len(points)]
+    if not middles:
+        return False
+    wide = min(radius for _, radius in middles)
+    light = np.asarray(cv2.GaussianBlur(np.asarray(own, np.float32), (0, 0), max(wide / 4.0, 0.5)), np.float32)
+    inside, beside = np.zeros(light.shape, np.uint8), np.ones(light.shape, np.uint8)
+    for middle, radius in middles:
+        at = tuple(int(v) for v in np.round(middle))
+        cv2.circle(inside, at, math.ceil(radius), 1, cv2.FILLED)
+        cv2.circle(beside, at, math.ceil(_BESIDE * radius), 0, cv2.FILLED)
+    if not inside.any() or not beside.any():
+        return False
+    return float(light[beside > 0].max()) > _FAR_BRIGHTER * float(light[inside > 0].max())
 
 
 def _against(frame: Frame, found: Estimate, noise: NoiseModel) -> str | None:

@@ -26,7 +26,11 @@ GLOWS: Final = (
 )
 OTHER_LIGHT: Final = (
     "something bright and round stands out, but has not the outline of the scene's beam: beam.kind is cycles or linear "
-    "where the light fades out softly, hard where it ends sharply"
+    "where the light fades out softly, hard where it ends sharply, and camera.lens says what blurs it"
+)
+OUTSHONE: Final = (
+    "something far brighter than what looks like the patch is elsewhere in the frame: "
+    "if that is the spotlight, state what blurs it (camera.lens, motion) or its beam"
 )
 BELOW_BLACK: Final = (
     "the frame is darker than no light: the black of the scene's sensor is too high (its black_level; or of a recorder,"

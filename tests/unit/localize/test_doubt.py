@@ -5,7 +5,7 @@ from dataclasses import replace
 import cv2
 import numpy as np
 import pytest
-from photographs import AMBIENT, NOISE, READ, WHITE, fundus, photograph, scene_of
+from photographs import AMBIENT, NOISE, PEAK, READ, WHITE, fundus, photograph, scene_of
 from scipy.ndimage import gaussian_filter
 
 from conespot.localize import locate
@@ -15,7 +15,7 @@ from conespot.localize.doubt import noise_of
 from conespot.localize.image import Frame
 from conespot.localize.model.knowns import Knowns
 from conespot.localize.model.suspicion import WALL, scores
-from conespot.localize.outcome import BELOW_BLACK, COMPRESSED, NO_LIGHT, OTHER_LIGHT, WRONG_NOISE
+from conespot.localize.outcome import BELOW_BLACK, COMPRESSED, NO_LIGHT, OTHER_LIGHT, OUTSHONE, WRONG_NOISE
 from conespot.localize.start.search import NOTHING, TWO_PLACES
 from conespot.localize.verdict import VERDICT, WRONG_BEAM, WRONG_TRANSFER, WRONG_WALL
 from conespot.scene import InputError, Scene
@@ -114,6 +114,20 @@ def test_two_instruments_are_refused_where_the_scene_has_one(beam):
     one, other = (photograph(scene, scene.pose(np.array(tip)), rays=2) for tip in (HERE, THERE))
     assert locate(one, scene, "photometric", noise=NOISE)
     assert locate(np.maximum(one, other), scene, "photometric", noise=NOISE).reason == TWO_PLACES
+
+
+def test_a_patch_that_other_light_far_outshines_is_refused_and_one_beside_a_reflex_is_not():
+    """Of a spotlight that the scene's beam does not explain, and a disc in ambient light that it does."""
+    scene = scene_of(HardBeam(), resolution=SIDE)
+    dim = 0.05 * WHITE / 4095.0 * photograph(scene, scene.pose(np.array(HERE)), noise=False)
+    y, x = np.mgrid[:SIDE, :SIDE]
+    other = 0.05 * PEAK * np.exp(-(np.square(x - 260.0) + np.square(y - 160.0)) / (2.0 * 14.0**2))
+    for times, refused in ((2.0, False), (20.0, True)):
+        electrons = dim + times * other
+        noisy = np.random.default_rng(0).normal(electrons, np.sqrt(electrons + READ**2))
+        image = np.round(noisy / WHITE * 4095.0).clip(0.0, 4095.0).astype(np.uint16)
+        found = locate(image, scene, "photometric", noise=NOISE)
+        assert found.reason == OUTSHONE if refused else off_um(found) < 10.0
 
 
 def test_a_beam_or_a_wall_told_wrongly_is_refused_with_the_reason_and_the_right_one_is_not():
