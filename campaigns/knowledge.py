@@ -8,10 +8,11 @@ pose.
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import numpy as np
-from pydantic import BeforeValidator, Field, PlainSerializer, model_validator
+from pydantic import Field, PlainSerializer, WrapValidator, model_validator
 
 from conespot.localize.model.knowns import RCM_SIGMA_MM, Knowns
 from conespot.localize.model.quantity import quantity
@@ -25,22 +26,37 @@ from conespot.scene.surface import AnySurface
 FREE = "free"
 
 
-def _sigma(kind: str, quantity: Any) -> Any:
-    """A sigma of that kind of quantity, or `free`."""
+def _sigma(kind: str | None, quantity: Any, *words: str) -> Any:
+    """A sigma of that kind of quantity, `free`, or another of the words."""
+
+    def read(value: Any, quantity: Callable[[Any], float]) -> float | str | None:
+        return None if value == FREE else value if value in words else quantity(value)
+
+    def write(value: float | str | None) -> float | str:
+        if value is None:
+            return FREE
+        return value if kind is None or isinstance(value, str) else format_quantity(value, kind)
+
     return Annotated[
-        Annotated[quantity, Field(ge=0.0)] | None,
-        BeforeValidator(lambda value: None if value == FREE else value),
-        Words(lambda: [FREE]),
-        PlainSerializer(lambda v: FREE if v is None else format_quantity(v, kind), when_used="json"),
+        Annotated[quantity, Field(ge=0.0)],
+        WrapValidator(read),
+        Words(lambda: [FREE, *words]),
+        PlainSerializer(write, when_used="json"),
     ]
 
 
 if TYPE_CHECKING:
+    Sigma = float | None
     LengthSigma = float | None
     AngleSigma = float | None
+    DoubtedSigma = float | Literal["doubted"] | None
+    UsualSigma = float | Literal["usual"] | None
 else:
+    Sigma = _sigma(None, float)
     LengthSigma = _sigma("length", Length)  #: [mm], None if free
     AngleSigma = _sigma("angle", Angle)  #: [rad], None if free
+    DoubtedSigma = _sigma("length", Length, "doubted")  #: [mm]
+    UsualSigma = _sigma(None, float, "usual")
 
 
 def _degrees(angle: float | None) -> float | None:
@@ -52,7 +68,8 @@ class Knowledge(Model):
 
     `rcm` is in mm along each axis, the others are in their own unit. `surface` and `beam` are what the localizers are
     told in place of the true ones, and so is `blur`, the width of what the camera's lens does not resolve (0 mm: it
-    resolves all). Without `spread_told` they are told that no light spreads under the retina; `spread_error` is of the
+    resolves all). Blur and core are `doubted` where nothing is said: free once a frame contradicts the scene by three
+    sigmas. Without `spread_told` they are told that no light spreads under the retina; `spread_error` is of the
     logarithms of its amount and of how far it goes. `reference` is how many frames without spotlights they are given,
     averaged; `sequence` from how many of the trajectory's own frames, evenly spread, they learn the same view.
     """
@@ -68,8 +85,11 @@ class Knowledge(Model):
     camera_tilt_sigma: AngleSigma = 0.0
     semi_axes_sigma: LengthSigma = 0.0
     relief_sigma: Length = Field(0.0, ge=0.0)
-    deep_amount_sigma: Annotated[float, Field(ge=0.0)] | Literal["usual"] = "usual"
-    deep_length_sigma: Annotated[float, Field(ge=0.0)] | Literal["usual"] = "usual"
+    deep_amount_sigma: UsualSigma = "usual"
+    deep_length_sigma: UsualSigma = "usual"
+    softness_sigma: Sigma = 0.0
+    blur_sigma: DoubtedSigma = "doubted"
+    core_sigma: DoubtedSigma = "doubted"
     blur: Length | None = Field(None, ge=0.0, le=0.2)
     surface: AnySurface | None = None
     beam: Beam | None = None
@@ -104,6 +124,9 @@ class Knowledge(Model):
             relief_sigma_mm=self.relief_sigma,
             deep_amount_sigma=self.deep_amount_sigma,
             deep_length_sigma=self.deep_length_sigma,
+            softness_sigma=self.softness_sigma,
+            blur_sigma_mm=self.blur_sigma,
+            core_sigma_mm=self.core_sigma,
         )
 
     def told(self, scene: Scene, rng: np.random.Generator) -> Scene:

@@ -25,6 +25,20 @@ sweep:
 """
 
 
+@pytest.mark.parametrize(
+    ("said", "known"),
+    [
+        ({"blur_sigma": "10 um"}, Knowns(blur_sigma_mm=0.01)),
+        ({"blur_sigma": "free", "core_sigma": "0 mm"}, Knowns(blur_sigma_mm=None, core_sigma_mm=0.0)),
+        ({"softness_sigma": 0.1, "deep_amount_sigma": "free"}, Knowns(softness_sigma=0.1, deep_amount_sigma=None)),
+    ],
+)
+def test_what_spreads_the_light_may_be_free_fixed_or_known_to_a_sigma(said, known):
+    knowledge = Knowledge.model_validate(said)
+    assert knowledge.knowns == known
+    assert Knowledge.model_validate(knowledge.model_dump(mode="json")) == knowledge
+
+
 @pytest.fixture
 def campaign(tmp_path):
     def write(text):
