@@ -111,16 +111,19 @@ class _View:
         return _Fit(at, math.log(max(gain, 1e-9)), math.log(level), disc)
 
     def round(self, fit: _Fit) -> tuple[Array, float, float]:
-        """Middle `[2]` and radius [mm] of the roundest bright region of what a fit leaves, and its votes."""
+        """Middle `[2]` and radius [mm] of the roundest bright region of what a fit leaves, and its votes.
+
+        Without votes where the fit's light is none.
+        """
         model = self._model(fit)[0]
+        if not np.isfinite(model).all():
+            return np.zeros(2), DISC.radii[0], 0.0
         seen = np.log(np.maximum(self._shown.signal / model, DISC.darkest))
         middle, radius, votes = find_round(seen, self._variance(model), self._use, self._side)
         return middle + [self._x[0, 0], self._y[0, 0]], radius, votes
 
     def shows_round(self, fit: _Fit) -> bool:
         """Whether a fit leaves a round that lies under the patch for the most part."""
-        if not np.isfinite(self._model(fit)[0]).all():
-            return False
         middle, radius, votes = self.round(fit)
         return votes > DISC.votes and self.shared(replace(fit, disc=Disc.at(middle, radius))) > DISC.shared_first
 

@@ -30,17 +30,17 @@ def find_round(albedo: Array, variance: Array, use: NDArray[np.bool_], side: flo
     row, column = np.nonzero(vote > 0.0)
     worth, length = vote[row, column], np.maximum(slope[row, column], 1e-12)
     along_x, along_y = gx[row, column] / length, gy[row, column] / length
-    beyond = math.ceil(DISC.radii[1] / side)  # a middle may be outside of the window
-    shape = tuple(n + 2 * beyond for n in albedo.shape)
     best = (np.zeros(2), DISC.radii[0], -1.0)
     for radius in np.geomspace(*DISC.radii, DISC.sizes):
-        at = [np.round(i + g * radius / side).astype(int) + beyond for i, g in ((row, along_y), (column, along_x))]
-        inside = (at[0] >= 0) & (at[0] < shape[0]) & (at[1] >= 0) & (at[1] < shape[1])
-        cast = np.bincount(at[0][inside] * shape[1] + at[1][inside], worth[inside], minlength=shape[0] * shape[1])
-        votes = cv2.GaussianBlur(cast.reshape(shape), (0, 0), DISC.vote_off / side, borderType=cv2.BORDER_CONSTANT)
+        beyond = math.ceil(radius / side)  # a middle may be outside of the window
+        height, width = (n + 2 * beyond for n in albedo.shape)
+        i, j = (np.round(at + g * radius / side).astype(int) + beyond for at, g in ((row, along_y), (column, along_x)))
+        cast = np.bincount(i * width + j, worth, minlength=height * width)
+        cast = cast.reshape(height, width).astype(np.float32)
+        votes = cv2.GaussianBlur(cast, (0, 0), DISC.vote_off / side, borderType=cv2.BORDER_CONSTANT)
         # the top of a round Gaussian, over the bins of a rim
         votes *= DISC.vote_off**2 / (radius * side)
-        i, j = np.unravel_index(int(np.argmax(votes)), shape)
-        if votes[i, j] > best[2]:
-            best = (side * (np.array([j, i]) - beyond), float(radius), float(votes[i, j]))
+        top = divmod(int(np.argmax(votes)), width)
+        if votes[top] > best[2]:
+            best = (side * (np.array(top[::-1]) - beyond), float(radius), float(votes[top]))
     return best

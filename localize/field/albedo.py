@@ -55,12 +55,14 @@ class Modes:
         return cls(along_y, along_x, twice[0], twice[1], spectrum, _octave(k), bin_mm)
 
     def density(self, shape: tuple[int, int], amplitudes: Array) -> Array:
-        """The albedo's power spectrum [mm2] at the waves of a real transform of `shape`; 0 at 0 and beyond the modes.
+        """The albedo's power spectrum [mm2] at the first waves `[h, w]` of a real transform of `shape`.
 
+        As many along a row as are no finer than the modes; 0 at 0 and beyond the modes.
         A window's modes have no slope at its sides, and no wave is longer than two of it. The albedo's are.
         """
-        k = np.hypot(*np.meshgrid(rfftfreq(shape[1], self.bin_mm), fftfreq(shape[0], self.bin_mm)))
-        there = (k > 0.0) & (k <= 0.5 / (FIELD.bins_a_mode * self.bin_mm))
+        finest, along = 0.5 / (FIELD.bins_a_mode * self.bin_mm), rfftfreq(shape[1], self.bin_mm)
+        k = np.hypot(fftfreq(shape[0], self.bin_mm)[:, None], along[along <= finest])
+        there = (k > 0.0) & (k <= finest)
         k = np.where(there, k, 1.0)
         power = amplitudes[_octave(k)] * k**-FIELD.exponent / (1.0 + (k / FIELD.knee) ** 2)
         return np.where(there, power, 0.0)

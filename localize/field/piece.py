@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import cache
 
 import cv2
 import numpy as np
@@ -31,6 +32,18 @@ def _chroma(lead: Shown, others: list[Shown]) -> Array:
         known = lead.usable & other.usable
         plane[known] = ratio[known] - (np.median(ratio[known]) if known.any() else 0.0)
     return found
+
+
+def _noise(count: int) -> Array:
+    """White noise `[count]`: always the same, so that a frame has one answer, and drawn once for all of them."""
+    return _drawn(1 << count.bit_length())[:count]
+
+
+@cache
+def _drawn(count: int) -> Array:
+    drawn = np.random.default_rng(0).standard_normal(count)
+    drawn.flags.writeable = False
+    return drawn
 
 
 class Piece:
@@ -165,11 +178,11 @@ class Piece:
         rows = root * (own - basis.fields(gain))
         both = np.append(step, self._share - self._reaction @ step)
         left = self._data - basis.field(solved.coefficients(both)) - np.tensordot(both, every, 1)
-        # always the same noise, so that a frame has one answer
-        noise = np.random.default_rng(0).standard_normal((FIELD.whites, height, width)) * (root > 0.0)
-        modes = solved.fitted(basis.project(root * noise))
-        moves = bread @ np.tensordot(rows, noise, ([1, 2], [1, 2]))
-        white = noise - root * basis.fields(modes) - np.tensordot(moves.T, rows, 1)
+        white = _noise(FIELD.whites * height * width).reshape(-1, height, width) * (root > 0.0)
+        modes = solved.fitted(basis.project(root * white))
+        moves = bread @ np.tensordot(rows, white, ([1, 2], [1, 2]))
+        white -= root * basis.fields(modes)
+        white -= np.tensordot(moves.T, rows, 1)
         known = self._reaction.T @ self._reaction / FIELD.chroma**2
         return known + albedo_scatter(root * rows, basis, self._spectrum) + rest_scatter(rows, root * left, white)
 

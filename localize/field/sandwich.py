@@ -35,8 +35,10 @@ _RINGS = 6
 def albedo_scatter(rows: Array, modes: Modes, amplitudes: Array) -> Array:
     """Covariance of the gradient `[P, P]` that the albedo makes; `rows` `[P, h, w]` are J W."""
     shape = _shape(rows)
-    waves = scipy.fft.rfft2(rows.astype(np.float32), shape)
-    density = modes.density(shape, amplitudes) * _twice(shape)
+    density = modes.density(shape, amplitudes)
+    columns = density.shape[1]  # the other waves are finer than the modes
+    waves = scipy.fft.fft(scipy.fft.rfft(rows.astype(np.float32), shape[1])[..., :columns], shape[0], axis=1)
+    density *= _twice(shape)[:columns]
     return _products(waves, density) / (shape[0] * shape[1] * modes.bin_mm**2)
 
 
@@ -47,15 +49,18 @@ def rest_scatter(rows: Array, residuals: Array, white: Array) -> Array:
     their leverage: beside the patch noise is another.
     """
     flat = rows.reshape(len(rows), -1)
-    scale = np.sqrt(np.maximum(np.sum(np.square(flat), axis=1), 1e-300))
-    unit = flat / scale[:, None]
-    values, vectors = np.linalg.eigh(unit @ unit.T)
+    products = flat @ flat.T
+    scale = np.sqrt(np.maximum(np.diag(products), 1e-300))
+    values, vectors = np.linalg.eigh(products / np.multiply.outer(scale, scale))
     able = values > 1e-9 * values.max()
-    leverage = np.sum(np.square((vectors[:, able] / np.sqrt(values[able])).T @ unit), axis=0)
+    unit = (vectors[:, able] / np.sqrt(values[able]) / scale[:, None]).T @ flat
+    leverage = np.einsum("ij,ij->j", unit, unit)
     shape = _shape(rows)
     ring, twice = _rings(shape), _twice(shape)
-    weighted = np.concatenate([residuals[None], white]) * np.sqrt(leverage).reshape(residuals.shape)
-    each = twice * np.square(np.abs(scipy.fft.rfft2(weighted.astype(np.float32), shape)))
+    weighted = np.empty((1 + len(white), *residuals.shape), np.float32)
+    np.multiply(np.sqrt(leverage).reshape(residuals.shape), residuals, out=weighted[0], casting="same_kind")
+    np.multiply(np.sqrt(leverage).reshape(residuals.shape), white, out=weighted[1:], casting="same_kind")
+    each = twice * np.square(np.abs(scipy.fft.rfft2(weighted, shape)))
     power = [np.bincount(ring.ravel(), plane.ravel(), minlength=_RINGS + 1) for plane in each]
     spectrum = power[0] / np.maximum(np.mean(power[1:], axis=0), 1e-300)
     waves = scipy.fft.rfft2(rows.astype(np.float32), shape)
