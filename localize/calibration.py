@@ -15,7 +15,6 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from conespot.localize.edge.band import BandFit
 from conespot.localize.edge.sandwich import EdgeFit
 from conespot.localize.image import AnyImage
 from conespot.localize.model.knowns import Knowns
@@ -49,10 +48,6 @@ class CalibrationSettings:
     #: a frame whose step, squared, is this many times the median's is left out: a vessel or a glint misled it. No
     #: frame here was, halved or doubled
     outlier: float = 30.0
-    #: how far the log light at each distance from a hard edge may be from what the image model says. Four fifths of
-    #: what one spotlight seemed to tell of a half angle was that profile, not the outline: six frames of 400 px cast
-    #: with 4 x 4 rays a pixel, dark by 3.5 % one pixel beyond the edge, put it ten sigmas off, and now three to six
-    profile: float = 0.1
     #: correlation from which on it is said: half of a variance is then another quantity's
     correlated: float = 0.7
     #: how a single frame's fit is held to the common values: it only has to be well conditioned, and comes off again.
@@ -261,14 +256,11 @@ def _term(fit: EdgeFit, scene: Scene, tight: Knowns, width: Width) -> tuple[Arra
     miss = np.array([u @ offset, v @ offset])
     # the frame's own priors come off again; at its minimum the data's slope is theirs turned round
     # light from under the retina is each frame's own, as it falls on another place
-    whole, lost = fit.information.copy(), np.zeros(len(fit.information))
-    if isinstance(fit, BandFit) and not _has_softness(scene):
-        unknown, lost = fit.without_profile(CALIBRATION.profile)
-        whole -= unknown
+    whole = fit.information
     others = reduction(whole, own) if len(whole) > own else np.eye(own)
     data = others @ whole @ others.T
     data[np.arange(size, own), np.arange(size, own)] -= own_prior
-    slope = np.concatenate([np.zeros(size), own_prior * (here - nominal)]) - others @ lost
+    slope = np.concatenate([np.zeros(size), own_prior * (here - nominal)])
     # as tight as it was: a patch that is small is fitted through the RCM itself
     tie = fit.prior[:2, :own]
     data -= tie.T @ tie

@@ -82,20 +82,6 @@ class BandFit(EdgeFit):
         """Covariance of the gradient `[P, P]` as the strips' residuals show it."""
         return self._scatter(self.channels, self.prior)
 
-    def without_profile(self, sigma: float) -> tuple[Array, Array]:
-        """Information `[P, P]` and gradient `[P]` that are lost if the profile across the outlines is not known.
-
-        Then the mean log light at each whole distance from them may be off by `sigma`.
-        """
-        size = len(self.information)
-        information, gradient = np.zeros((size, size)), np.zeros(size)
-        for channel in self.channels:
-            for sign, part in ((1.0, channel.eliminated(size)), (-1.0, channel.eliminated(size, sigma))):
-                reduced = reduction(part.information, size)
-                information += sign * reduced @ part.information @ reduced.T
-                gradient += sign * reduced @ part.gradient
-        return information, gradient
-
     @cached_property
     def there(self) -> tuple[Nuisances, ...]:
         """The channels where the fit stands, evaluated after its last step; those of the fit stay as they are."""

@@ -120,26 +120,16 @@ class Nuisances:
         spreads = [self.slow_spread, *self.strips.slow_levels * [self.slow_level]]
         return np.concatenate([[gain, 1e-9], np.repeat(np.array(spreads) ** -2, len(self.slow) // len(spreads))])
 
-    def eliminated(self, size: int, profile: float | None = None) -> Eliminated:
-        """The normal equations of `size` shared parameters, gain, level and slow slopes, the strips' own eliminated.
-
-        With a `profile` the mean log light at each whole distance from the outlines, so far not known [1], joins them
-        behind the gain.
-        """
-        rows, precision = self.rows, self.precision
-        if profile is not None:
-            distance = np.round(self.strips.offset)
-            rows = np.concatenate([rows, distance == np.unique(distance)[:, None]])
-        moments = Moments.of(self.strips, rows, self.residual, self.weights, self.levels)
+    def eliminated(self, size: int) -> Eliminated:
+        """The normal equations of `size` shared parameters, gain, level and slow slopes, the strips' own eliminated."""
+        precision = self.precision
+        moments = Moments.of(self.strips, self.rows, self.residual, self.weights, self.levels)
         part = Eliminated.of(moments, self.spread)
-        own = [size, *range(len(rows), len(part.gradient))]
+        own = range(size, len(part.gradient))
         part.information[own, own] += precision
-        part.gradient[own[2:]] -= precision[2:] * self.slow
+        part.gradient[size + 2 :] -= precision[2:] * self.slow
         if self.told is not None:
             part.gradient[size] -= precision[0] * (self.gain - self.told[0])
-        if profile is not None:
-            across = range(size + 1, len(rows))
-            part.information[across, across] += profile**-2
         return part
 
     def scores(self) -> tuple[Array, Array]:

@@ -104,7 +104,7 @@ class Cones:
         self, sight: Sight, pose: Pose, scene: Scene, profile: Profile, *, pose_size: int = 5, wall: float = 0.0
     ) -> None:
         """As `light` takes them."""
-        self._sight, self._pose, self._wall = sight, pose, wall
+        self._sight, self._pose, self._wall, self._profile = sight, pose, wall, profile
         radius = scene.eye.radius
         basis = rotation_basis(pose.axis)[: pose_size - 3]
         to = sight.points - pose.apex
@@ -126,10 +126,14 @@ class Cones:
             slope = here.slope * rise.stretch
             if not spread.is_none:
                 mixed += slope * spread.covariance(rise, falloff, radius)
-            slope = slope * f
+            slope = slope * cone.pace * f
+            turns = np.array([cross(vector, axis) for vector in basis])
             rows[:3] -= slope * rise.across.T
-            for j, vector in enumerate(basis):
-                rows[3 + j] += slope * (to @ cross(vector, axis))
+            rows[3:] += slope * (turns @ to.T)
+            if profile.is_a_step:
+                # what a pixel shows of a step is where it lies [px]: where the cosine rises faster, nearer
+                at = np.flatnonzero(slope)
+                rows[:, at] -= slope[at] * (rise.c[at] - profile.knots[0]) * rise.steeper(at, turns)
         lit = cosine > 0.0
         rows[:3] += np.where(lit, total, 0.0) * falloff.T
         self.rows = rows
@@ -137,8 +141,20 @@ class Cones:
 
     def by_beam(self, wide: Profile, narrow: Profile, between: float) -> Array:
         """The light's derivative `[N]` by what makes the profile the one or the other, `between` which lies so much."""
-        off = sum(cone.average(wide).mean - cone.average(narrow).mean for cone in self._each)
+        off = sum(cone.pace * (cone.average(wide).mean - cone.average(narrow).mean) for cone in self._each)
         return np.asarray(self._f * off / between)
+
+    def by_pixels(self, sides: tuple[Sight, Sight], step: float) -> Array:
+        """The light's derivative `[N]` by a quantity as far as pixels become larger or smaller on the wall with it.
+
+        `sides` are what they see at +-`step` of it; where they look to, `light_by_surface` takes in.
+        """
+        found = np.zeros(len(self._f))
+        if self._profile.is_a_step:
+            x, y = ((getattr(sides[0], k) - getattr(sides[1], k)) / (2.0 * step) for k in ("along_x", "along_y"))
+            for cone in self._each:
+                found -= cone.pace * cone.here.slope * (cone.rise.c - self._profile.knots[0]) * cone.rise.larger(x, y)
+        return np.asarray(self._f * found)
 
     def by_spread(self, wider: Scene, step: float, wall: float | None = None) -> Array:
         """The light's derivative `[N]` by what makes the image's spread that of another scene, or on the `wall`.
@@ -158,6 +174,7 @@ class _Cone:
 
     rise: Rise
     here: Smooth
+    pace: Array  #: how fast the variable in the mean over a pixel grows with that in its middle `[N]`
     average: Callable[[Profile], Smooth]  #: of any profile in the beam's place
     curved: Callable[[], Array]  #: second derivative of the mean by the variable `[N]`, which hardly anybody asks for
     spread: Spread
@@ -167,15 +184,15 @@ class _Cone:
         """Of a beam's profile, on a wall of that radius."""
         px, py = rise.halves
         if spread.is_none:
-            sharp, nothing = rise.on_pixels(profile, radius), np.zeros(0)
+            (sharp, pace), nothing = rise.on_pixels(profile, radius), np.zeros(0)
             here = Smooth(*profile.mean(sharp, px, py), nothing, nothing)
 
             def mean(of: Profile) -> Smooth:
                 return Smooth(*of.mean(sharp, px, py), nothing, nothing)
 
-            return cls(rise, here, mean, lambda: profile.curvature(sharp, px, py), spread)
+            return cls(rise, here, pace, mean, lambda: profile.curvature(sharp, px, py), spread)
         widths = spread.widths(rise)
-        w, skew = spread.bent(rise, widths, profile, radius)
+        w, pace, skew = spread.bent(rise, widths, profile, radius)
         # of what is sought, less than a pixel's own variance
         least = (np.square(rise.gx) + np.square(rise.gy)) / 12.0 if spread.sought else 0.0
         over = widths.average(least, rise.stretch)
@@ -185,7 +202,7 @@ class _Cone:
             return replace(found, mean=found.mean + skew * rise.stretch**3 * found.third)
 
         here = average(profile)
-        return cls(rise, here, average, lambda: here.curvature, spread)
+        return cls(rise, here, pace, average, lambda: here.curvature, spread)
 
     @cached_property
     def bend(self) -> Array:

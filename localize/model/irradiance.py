@@ -86,11 +86,10 @@ class Irradiance:
         here = Light(cones.value, np.stack([*cones.rows, *rows]))
         if not moving:
             return here.value, here.jacobian
+        sides = [_sides(estimate, each, self._pixels[self._lit], self._side) for each in moving]
         by_sight = [
-            light_by_surface(
-                here, seen, estimate.pose, _sides(estimate, each, self._pixels[self._lit], self._side), each.step
-            )
-            for each in moving
+            light_by_surface(here, seen, estimate.pose, both, each.step) + cones.by_pixels(both, each.step)
+            for both, each in zip(sides, moving, strict=True)
         ]
         # and the iris before some of the bins
         return np.nan_to_num(here.value), np.nan_to_num(np.stack([*here.jacobian, *by_sight]))

@@ -62,6 +62,11 @@ class Profile:
         """Whether the light jumps at the edge of the cone."""
         return bool(self.coefficients[0, 0] > 0.0)
 
+    @property
+    def is_a_step(self) -> bool:
+        """Whether it is nothing but that jump."""
+        return self.begins_with_a_step and len(self.knots) == 1 and not self.coefficients[0, 1:].any()
+
     def variable(self, cosine: Array) -> tuple[Array, Array | float]:
         """w at cosines of the angle off the axis, and |dw / dcosine|."""
         if self.cosine:

@@ -88,6 +88,26 @@ class Rise:
         )
         return tangential, normal
 
+    def steeper(self, at: NDArray[np.intp], turns: Array) -> Array:
+        """Derivatives of the logarithm of the cosine's rise per pixel, at some pixels `[3 + K, n]`.
+
+        By the tip [1/mm], and by the axis as it turns, its derivatives being `turns` `[K, 3]` [1/rad].
+        """
+        gx, gy = self.gx[at], self.gy[at]
+        size = np.maximum(np.square(gx) + np.square(gy), 1e-300)
+        # the step in space straight across the edge by which the cosine rises by 1
+        step = (gx * some(self.sight.along_x, at).T + gy * some(self.sight.along_y, at).T) / size
+        to, across, d = some(self.to, at).T, some(self.across, at).T, self.d[at]
+        along = np.einsum("in,in->n", to, step)
+        by_tip = (to + across * along) / d + self.c[at] / np.square(d) * (step - to * along)
+        by_turn = (turns @ step - (turns @ to) * along) / d
+        return np.concatenate([by_tip, by_turn])
+
+    def larger(self, x: Array, y: Array) -> Array:
+        """How the logarithm of the cosine's rise per pixel changes `[N]` where a pixel's sides do by `[N, 3]` each."""
+        by = self.gx * np.einsum("ij,ij->i", self.across, x) + self.gy * np.einsum("ij,ij->i", self.across, y)
+        return np.asarray(by / np.maximum(np.square(self.gx) + np.square(self.gy), 1e-300))
+
     def on_wall(self, at: NDArray[np.intp], radius: float) -> tuple[Array, Array]:
         """The same by one millimetre on the wall."""
         flat = self.along_wall[at]
@@ -100,24 +120,25 @@ class Rise:
         unit = flat / np.maximum(np.linalg.norm(flat, axis=1, keepdims=True), 1e-300)
         return self.second(at, np.cross(self.axis, unit)), self.second(at, unit)
 
-    def on_pixels(self, profile: Profile, radius: float) -> Array:
-        """The variable `[N]` as a pixel has it in the mean, where an edge crosses it.
+    def on_pixels(self, profile: Profile, radius: float) -> tuple[Array, Array]:
+        """The variable `[N]` as a pixel has it in the mean, where an edge crosses it, and how fast that grows with it.
 
         Along the edge t^2 has the mean 1/12 over a pixel: a half plane covers more of it than the convex patch does, by
         1 / (24 R) px for a radius of R px. Across, the edge lies some way from the pixel's centre: a step counts where
         it is, a slope as the mean over the pixel.
         """
         px, py = self.halves
-        step = profile.begins_with_a_step
+        step, pace = profile.begins_with_a_step, np.ones(len(self.w))
         # at the foot of a soft edge too: it is all that a clipped patch shows
         at = np.flatnonzero(np.abs(self.w - profile.knots[0]) < (1.5 if step else 4.0) * (px + py))
         if not len(at):
-            return self.w
+            return self.w, pace
+        tangential, normal = self.in_image(at, radius)
         if step:
             missing = (profile.knots[0] - self.w[at]) / np.broadcast_to(self.stretch, self.w.shape)[at]
             length = np.maximum(np.hypot(self.gx[at], self.gy[at]), 1e-300)
             away: Array | float = np.clip(missing / length, -0.7, 0.7)
+            pace[at] -= np.where(np.abs(missing) < 0.7 * length, normal * away / length, 0.0)
         else:
             away = math.sqrt(1.0 / 12.0)
-        tangential, normal = self.in_image(at, radius)
-        return self.raised(at, tangential / 24.0 + normal * away**2 / 2.0)
+        return self.raised(at, tangential / 24.0 + normal * away**2 / 2.0), pace

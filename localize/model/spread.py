@@ -154,8 +154,10 @@ class Spread:
             found = found + self.wall * np.einsum("ij,ij->i", over, rise.along_wall)
         return np.asarray(found)
 
-    def bent(self, rise: Rise, widths: Widths, profile: Profile, radius: float) -> tuple[Array, Array]:
-        """The variable `[N]` in the mean over pixel and spread, on a surface of that radius; what its skewness adds.
+    def bent(self, rise: Rise, widths: Widths, profile: Profile, radius: float) -> tuple[Array, Array, Array]:
+        """The variable `[N]` in the mean over pixel and spread, on a surface of that radius.
+
+        And how fast that grows with it, and what its skewness adds, `[N]` each.
 
         To a displacement x with a second derivative h the mean owes h E[x^2 g'] / 2. For a smooth profile and a
         variance v that is h v / 2 times the mean of g' and v times that of its third derivative: the second array is
@@ -167,15 +169,16 @@ class Spread:
         step = profile.begins_with_a_step
         near = np.square(missing) < _FAR**2 * whole
         at = np.flatnonzero(near if step else near | (missing < 0.0))
-        by, skew = np.zeros(len(at)), np.zeros(len(rise.w))
+        by, pace, skew = np.zeros(len(at)), np.ones(len(rise.w)), np.zeros(len(rise.w))
         for second, own in self._seconds(rise, widths, at, radius):
             if step:
                 share = own / whole[at]
                 by += second * (1.0 - share + share * np.square(missing[at]) / whole[at]) / 2.0
+                pace[at] -= second * share * missing[at] / whole[at]
             else:
                 by += second / 2.0
                 skew[at] += second * own / 2.0
-        return rise.raised(at, by), skew
+        return rise.raised(at, by), pace, skew
 
     def _seconds(
         self, rise: Rise, widths: Widths, at: NDArray[np.intp], radius: float

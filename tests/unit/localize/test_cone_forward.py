@@ -3,9 +3,15 @@
 import numpy as np
 import pytest
 
+from conespot.localize import Knowns
+from conespot.localize.model.estimate import Estimate
 from conespot.localize.model.forward import light, moved
+from conespot.localize.model.irradiance import Irradiance
+from conespot.localize.model.prior import prior_rows
 from conespot.localize.model.profile import Profile
+from conespot.localize.model.quantity import quantity
 from conespot.localize.model.sight import look, window
+from conespot.localize.model.solve import inverse
 from conespot.scene.beam import CyclesBeam, HardBeam, LinearBeam, TabulatedBeam
 from conespot.scene.camera import Camera
 from conespot.scene.pose import Pose, tangents
@@ -76,6 +82,31 @@ def test_the_jacobian_is_the_derivative(beam, _):
         sides = [light(sight, moved(pose, s * step), scene, profile).value for s in (1.0, -1.0)]
         numeric = (sides[0] - sides[1]) / 2e-5
         assert np.max(np.abs(rows[i] - numeric)) < 0.03 * np.max(np.abs(numeric))
+
+
+@pytest.mark.parametrize("name", ["half_angle", "eye_radius", "camera_height", "camera_tilt_x"])
+def test_a_hard_edge_tells_no_more_of_beam_and_camera_than_its_light_does(name):
+    """What a pose can nearly imitate leaves little, of which a slightly wrong derivative would make much."""
+    scene = Scene(camera=Camera(resolution=500, tilt=0.05, azimuth=0.3))
+    pose = scene.pose(np.array([1.0, 0.5, 4.0]))
+    knowns = Knowns(**{quantity(name).known: 1.0})
+    low, size = patch(scene, pose)
+    pixels = window(low[1], low[0], size[1], size[0])
+    here = Estimate(pose, scene)
+    shed = Irradiance(look(scene, pixels), pixels, 1, here, knowns, np.ones(len(pixels), bool))
+    value, rows = shed(here)[0]
+    _, prior = prior_rows(here, scene, knowns)
+
+    def sigma(jacobian):
+        """Of the quantity, where every pixel's light is known to a hundredth of the brightest."""
+        whitened = np.concatenate([jacobian / (0.01 * value.max()), prior.T], axis=1)
+        return np.sqrt(inverse(whitened @ whitened.T)[5, 5])
+
+    numeric = np.empty_like(rows)
+    for i, step in enumerate(np.diag([1e-5] * 3 + [1e-6] * 2 + [quantity(name).step] * (len(rows) - 5))):
+        sides = [shed(here.moved(sign * step, knowns.free))[0][0] for sign in (1.0, -1.0)]
+        numeric[i] = (sides[0] - sides[1]) / (2.0 * step[i])
+    assert sigma(rows) == pytest.approx(sigma(numeric), rel=0.03)
 
 
 def test_a_binned_pixel_is_the_mean_of_its_pixels():

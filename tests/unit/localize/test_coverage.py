@@ -11,7 +11,7 @@ from photographs import AMBIENT, NOISE, PEAK, READ, WHITE, albedo, fundus, photo
 from scipy.ndimage import gaussian_filter
 from scipy.stats import binom, chi2
 
-from conespot.localize import Localization, locate
+from conespot.localize import Knowns, Localization, locate
 from conespot.localize.edge.ribbon import Ribbon
 from conespot.localize.edge.rounding import Rounding
 from conespot.localize.field.roughness import Roughness
@@ -206,6 +206,20 @@ def holds(squares):
     """Whether the 99 % interval of a binomial contains 95 % of the answers."""
     inside = sum(value < chi2.ppf(0.95, 3) for value in squares)
     return binom.cdf(inside, len(squares), 0.95) > 0.005 and binom.sf(inside - 1, len(squares), 0.95) > 0.005
+
+
+def test_a_half_angle_that_is_told_wrongly_with_its_sigma_leaves_hard_tips_in_their_ellipsoids():
+    """9.2 deg +- 0.2 where 9 is true: 60 to 80 um off along the axis if it is held."""
+    scene, rng = scene_of(HardBeam(), resolution=400), np.random.default_rng(8)
+    squares = []
+    for number in range(12):
+        pose = scene.pose(rng.uniform((-1.5, -1.5, 3.0), (1.5, 1.5, 4.5)))
+        told = misinformed(scene, rng).model_copy(update={"beam": scene.beam.stretched(math.radians(9.2))})
+        frame = brighter(electrons(scene, pose, None), 1.0, number)
+        found = locate(frame, told, "cone", noise=NOISE, knowns=Knowns(half_angle_sigma_deg=0.2))
+        assert isinstance(found, Localization), found.reason
+        squares.append(square(found, pose))
+    assert holds(squares), squares
 
 
 @pytest.mark.slow
