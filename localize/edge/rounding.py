@@ -2,7 +2,7 @@
 
 An edge's frequencies are larger than the steps or rounded away, whatever the sensor's noise is: the rounding is hardly
 noise, and the same around an outline. It makes the foot of a step brighter, where a fit looks first: at quality 90
-pixels of less than a tenth of the step by two to three codes in the mean.
+pixels of 0.3 to 3 % of the step by two to three codes in the mean.
 """
 
 from __future__ import annotations
