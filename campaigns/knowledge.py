@@ -29,8 +29,10 @@ FREE = "free"
 def _sigma(kind: str | None, quantity: Any, *words: str) -> Any:
     """A sigma of that kind of quantity, `free`, or another of the words."""
 
-    def read(value: Any, quantity: Callable[[Any], float]) -> float | str | None:
-        return None if value == FREE else value if value in words else quantity(value)
+    def read(value: object, quantity: Callable[[object], float]) -> float | str | None:
+        if value == FREE:
+            return None
+        return value if isinstance(value, str) and value in words else quantity(value)
 
     def write(value: float | str | None) -> float | str:
         if value is None:

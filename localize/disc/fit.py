@@ -23,12 +23,13 @@ from conespot.localize.model.deep import Deep
 from conespot.localize.model.estimate import Estimate
 from conespot.localize.model.knowns import Knowns
 from conespot.localize.model.noise import NoiseModel
+from conespot.localize.model.prior import on_rcm
 from conespot.localize.model.residual import incident_light, log_residuals, student_cost, student_weights
 from conespot.localize.model.view import Bins, Shown, Window, outline
 from conespot.localize.outcome import DISC_UNDER_IT, Localization, LocalizationFailure, Outcome
 from conespot.localize.start.rig import poses_on
 from conespot.localize.start.rings import Ring
-from conespot.scene.pose import Pose, tangents
+from conespot.scene.pose import Pose
 
 Array = NDArray[np.float64]
 #: parameters without a disc's: the tip, the log of the gain and the retina's level
@@ -204,11 +205,9 @@ class _View:
         if float(np.linalg.norm(at.pose.apex - self._near.pose.apex)) > DISC.stale_mm:
             self._near, self._bins = at, Bins(self._at, at, self._knowns, 0)
         light, rows = self._bins.spotlight(at)[0]
-        u, v = tangents(at.pose.axis)
-        length = float(np.linalg.norm(at.pose.apex - np.asarray(self._scene.instrument.rcm)))
         both = np.zeros((4, self._ambient.size))
         both[0, self._bins.lit] = light
-        both[1:, self._bins.lit] = rows[:3] + (np.outer(u, rows[3]) + np.outer(v, rows[4])) / length
+        both[1:, self._bins.lit] = on_rcm(rows, at.pose, self._scene)
         planes = np.where(self._use, both.reshape(4, *self._shape), 0.0)
         return planes[0], planes[1:]
 

@@ -26,6 +26,13 @@ def rcm_miss(pose: Pose, scene: Scene) -> Array:
     return np.array([u @ offset, v @ offset])
 
 
+def on_rcm(rows: Array, pose: Pose, scene: Scene) -> Array:
+    """Derivatives by the tip `[3, N]` of what has `rows` `[5 or more, N]` by tip and axis, the axis held on the RCM."""
+    u, v = tangents(pose.axis)
+    length = float(np.linalg.norm(pose.apex - np.asarray(scene.instrument.rcm)))
+    return np.asarray(rows[:3] + (np.outer(u, rows[3]) + np.outer(v, rows[4])) / length)
+
+
 def prior_rows(estimate: Estimate, nominal: Scene, knowns: Knowns) -> tuple[Array, Array]:
     """Whitened residuals `[Q]` and Jacobian `[Q, P]` of what is known, for P = pose parameters and free quantities."""
     free, pose_size = knowns.free, estimate.pose_size

@@ -14,6 +14,7 @@ from scipy.optimize import least_squares
 
 from conespot.localize.image import Frame
 from conespot.localize.model.estimate import Estimate
+from conespot.localize.model.prior import on_rcm
 from conespot.localize.model.smear import smear_sigma
 from conespot.localize.spot.light import Moving, SpotLight
 from conespot.localize.spot.settings import SPOT
@@ -108,10 +109,7 @@ class _Problem:
         if self._last is None or self._last[0] != key:
             here = self._moving(x)
             value, rows = self._light(here, channel=self._lead)
-            pose = here.estimate.pose
-            u, v = tangents(pose.axis)
-            length = float(np.linalg.norm(pose.apex - np.asarray(self._scene.instrument.rcm)))
-            tied = rows[:3] + (np.outer(u, rows[3]) + np.outer(v, rows[4])) / length
+            tied = on_rcm(rows, here.estimate.pose, self._scene)
             moving = rows[5:] if self._way > 0.0 else np.zeros_like(rows[5:])
             self._last = key, value[self._use], np.concatenate([tied, moving])[:, self._use]
         return self._last[1], self._last[2]

@@ -19,6 +19,7 @@ from conespot.localize.image import Frame, Reference
 from conespot.localize.model.estimate import Estimate
 from conespot.localize.model.forward import moved
 from conespot.localize.model.outline import distances
+from conespot.localize.model.prior import on_rcm
 from conespot.localize.model.residual import spread
 from conespot.localize.outcome import Localization, LocalizationFailure, Outcome
 from conespot.localize.start.rays import rays_across, support
@@ -277,9 +278,7 @@ def _towards(estimate: Estimate, pixels: Array, spots: NDArray[np.intp], worth: 
         return None
     r, jacobian, worth, sizes = r[seen], jacobian[seen], worth[seen], sizes[seen]
     rcm = np.asarray(scene.instrument.rcm)
-    length = float(np.linalg.norm(pose.apex - rcm))
-    u, v = tangents(pose.axis)
-    tied = jacobian[:, :3] + (np.outer(jacobian[:, 3], u) + np.outer(jacobian[:, 4], v)) / length
+    tied = np.ascontiguousarray(on_rcm(jacobian.T, pose, scene).T)
     if roll:
         tied = np.column_stack([tied, jacobian[:, 5]])
     scale = np.maximum(START.outline_error * sizes, spread(r))
@@ -296,5 +295,6 @@ def _towards(estimate: Estimate, pixels: Array, spots: NDArray[np.intp], worth: 
     through = Pose.through(tip, rcm)
     if not roll:
         return Estimate(through, scene)
-    turned = moved(pose, np.array([*step[:3], u @ step[:3] / length, v @ step[:3] / length, step[3]]))
+    length = float(np.linalg.norm(pose.apex - rcm))
+    turned = moved(pose, np.array([*step[:3], *(unit @ step[:3] / length for unit in tangents(pose.axis)), step[3]]))
     return Estimate(Pose(tip, through.axis, turned.roll), scene)
